@@ -32,7 +32,11 @@ pub fn heed(arguments: impl IntoIterator<Item = OsString>) {
 ///
 /// # Errors
 /// None in practice.
-pub fn signed(files: &mut BTreeMap<String, String>, out: Out<'_>, read: &[(&'static str, String)]) -> Result<(), Failure> {
+pub fn signed(
+    files: &mut BTreeMap<String, String>,
+    out: Out<'_>,
+    read: &[(&'static str, String)],
+) -> Result<(), Failure> {
     let pages = files.iter_mut().filter(|(name, _)| name.ends_with(".html"));
     for (_, page) in pages {
         *page = signed_page(page, out, read)?;
@@ -70,7 +74,10 @@ fn command(typed: &[String], out: Out<'_>) -> Option<CommandLine> {
             command = command.argument(word);
         }
     }
-    Some(out.iter().fold(command, |command, (name, value)| command.option(name, value)))
+    Some(
+        out.iter()
+            .fold(command, |command, (name, value)| command.option(name, value)),
+    )
 }
 
 #[cfg(test)]

@@ -26,7 +26,11 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     let findings = &diagnosis.findings;
     let list = comparison::compared(diagnosis);
     let mut page = Page::new(title(findings.verdict));
-    page = page.verdict_as(mark(findings.verdict), word(findings.verdict), headline(diagnosis, &list));
+    page = page.verdict_as(
+        mark(findings.verdict),
+        word(findings.verdict),
+        headline(diagnosis, &list),
+    );
     if !list.is_empty() {
         page = page.section(comparison::section(&list));
     }
@@ -143,7 +147,8 @@ fn causes(diagnosis: &Diagnosis) -> Section {
     if !findings.partial.is_empty() {
         section = section.text("The best of the known causes leave structure and are not named as causes:");
         section = section.table(table("Partial explanation", &findings.partial));
-        section = section.text("What it would gain stands in the table above, under after. None of it is an explanation.");
+        section =
+            section.text("What it would gain stands in the table above, under after. None of it is an explanation.");
     }
     if let Some(aside) = &findings.set_aside {
         section = section.text(format!(

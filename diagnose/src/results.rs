@@ -45,21 +45,36 @@ impl Asked {
             .option("--model", &self.model)
             .options("--train", &self.train)
             .options("--heldout", &self.heldout);
-        let command = self.map.iter().fold(command, |command, map| command.option("--map", map));
-        let others = self.others.iter().fold(command, |command, (name, value)| match value.is_empty() {
-            true => command.flag(name, true),
-            false => command.option(name, value),
-        });
+        let command = self
+            .map
+            .iter()
+            .fold(command, |command, map| command.option("--map", map));
+        let others = self
+            .others
+            .iter()
+            .fold(command, |command, (name, value)| match value.is_empty() {
+                true => command.flag(name, true),
+                false => command.option(name, value),
+            });
         others.option("--out", "diagnosis")
     }
 
     fn read(&self) -> Vec<(&'static str, String)> {
-        let mut read = vec![("model", self.model.clone()), ("training records", self.train.join(", "))];
+        let mut read = vec![
+            ("model", self.model.clone()),
+            ("training records", self.train.join(", ")),
+        ];
         if !self.heldout.is_empty() {
             read.push(("held-out records", self.heldout.join(", ")));
         }
-        if !self.map.is_empty() {
-            read.push(("column map", self.map.join(", ")));
+        let files = self
+            .others
+            .iter()
+            .filter(|(name, _)| *name == "--columns")
+            .map(|(_, file)| file.clone());
+        let maps: Vec<String> = files.chain(self.map.iter().cloned()).collect();
+        if !maps.is_empty() {
+            read.push(("column map", maps.join(", ")));
         }
         read
     }

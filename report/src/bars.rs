@@ -142,7 +142,13 @@ impl BarChart {
 
     fn alt(&self, axes: &[Settled]) -> String {
         let panels: Vec<Vec<(String, Vec<f64>)>> = (self.panels.iter())
-            .map(|panel| panel.series.iter().map(|(name, values, _)| (name.clone(), values.clone())).collect())
+            .map(|panel| {
+                panel
+                    .series
+                    .iter()
+                    .map(|(name, values, _)| (name.clone(), values.clone()))
+                    .collect()
+            })
             .collect();
         let panels: Vec<_> = axes.iter().zip(panels.iter().map(Vec::as_slice)).collect();
         alt::bars(&self.title, &panels, &self.categories)
@@ -179,7 +185,11 @@ impl BarChart {
         // long names take at most this much; the bars are what the chart is for
         let room = sheet_width * 0.45;
         let names: Vec<Vec<String>> = self.categories.iter().map(|name| wrap(name, SMALL, room)).collect();
-        let widest = names.iter().flatten().map(|line| width(line, SMALL)).fold(0.0, f64::max);
+        let widest = names
+            .iter()
+            .flatten()
+            .map(|line| width(line, SMALL))
+            .fold(0.0, f64::max);
         let left = EDGE + widest.min(room) + 8.0;
         let wide = ((sheet_width - left - EDGE - 12.0 - (beside as f64 - 1.0) * GAP) / beside as f64).max(40.0);
         // a tick for every 75 pixels: the widest usual label has room

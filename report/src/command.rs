@@ -95,7 +95,9 @@ pub fn made<K: Into<String>, V: Into<String>>(
     command: &CommandLine,
     read: impl IntoIterator<Item = (K, V)>,
 ) -> Result<String, ReportError> {
-    let section = Section::new("How this page was made").code(command.to_string()).pairs(read);
+    let section = Section::new("How this page was made")
+        .code(command.to_string())
+        .pairs(read);
     let mut out = Markup::default();
     section.whole(&mut out, &[("id", &MADE)], &mut 0)?;
     let link = format!("<a href=\"#{MADE}\">Its command.</a>\n");

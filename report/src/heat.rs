@@ -9,8 +9,8 @@ use crate::colour::{Colour, Ramp};
 use crate::error::ReportError;
 use crate::font::{SMALL, width};
 use crate::frame::{
-    Area, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, below, border, grid, height_on, rectangle, sheet,
-    widest,
+    Area, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, below, border, grid, height_on, rectangle,
+    sheet, widest,
 };
 use crate::markup::{Markup, Px};
 use crate::path;
@@ -157,7 +157,11 @@ impl HeatMap {
         let left = EDGE + widest(&y).max(24.0) + 6.0;
         let beside = if is_narrow { BESIDE / 2.0 } else { BESIDE };
         let bar = BAR + 6.0 + widest(&value);
-        let bar = if is_narrow { bar } else { bar.max(width(&value.label, SMALL)) };
+        let bar = if is_narrow {
+            bar
+        } else {
+            bar.max(width(&value.label, SMALL))
+        };
         let right = EDGE + if categories { 8.0 } else { beside + bar };
         // whole pixels, so that cells, frame and grid meet without half-covered edges
         let area = Area {
@@ -166,7 +170,10 @@ impl HeatMap {
             width: (wide - left - right).floor(),
             height: height_on(wide, HEIGHT),
         };
-        let area = Area { height: area.height.floor(), ..area };
+        let area = Area {
+            height: area.height.floor(),
+            ..area
+        };
         let alt = alt::map(&self.title, &x, &y, &value, &self.cells);
         let mut out = sheet(&alt, wide, area.bottom() + TICK_ROOM + LINE + EDGE);
         head.draw(&mut out);

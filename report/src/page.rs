@@ -311,8 +311,12 @@ fn pick(out: &mut Markup, what: &str, sections: &[Section], picks: &mut usize) -
     for (n, section) in sections.iter().enumerate() {
         let id = format!("pick-{number}-{n}");
         let name = format!("pick-{number}");
-        let mut attributes: Vec<(&str, &dyn std::fmt::Display)> =
-            vec![("type", &"radio"), ("id", &id), ("name", &name), ("autocomplete", &"off")];
+        let mut attributes: Vec<(&str, &dyn std::fmt::Display)> = vec![
+            ("type", &"radio"),
+            ("id", &id),
+            ("name", &name),
+            ("autocomplete", &"off"),
+        ];
         if n == 0 {
             attributes.push(("checked", &"checked"));
         }

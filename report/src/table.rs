@@ -97,13 +97,21 @@ impl Table {
             out.open("tr", &[]);
             for (content, (heading, decimals)) in row.iter().zip(&self.columns) {
                 let text = match content {
+                    // an empty cell looks forgotten
+                    Cell::Text(text) if text.is_empty() => "–".to_owned(),
                     Cell::Text(text) => text.clone(),
                     Cell::Number(value) if value.is_nan() => "–".to_owned(),
                     // `fixed` for its true minus sign
                     Cell::Number(value) if value.is_infinite() => fixed(*value, 0).replace("inf", "∞"),
                     Cell::Number(value) => fixed(*value, decimals.unwrap_or(6)),
                 };
-                cell(out, "td", decimals.is_some(), is_wide.then_some(heading.as_str()), &text);
+                cell(
+                    out,
+                    "td",
+                    decimals.is_some(),
+                    is_wide.then_some(heading.as_str()),
+                    &text,
+                );
             }
             out.close("tr");
         }

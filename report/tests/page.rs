@@ -210,19 +210,28 @@ fn a_picture_that_cannot_be_drawn_leaves_its_reason_and_the_rest_of_the_page() {
 
 #[test]
 fn a_page_says_its_command_and_every_picture_leads_there() {
-    let command = report::CommandLine::new("policyc simulate").argument("a <b>.toml").options("--with", ["it's"]);
+    let command = report::CommandLine::new("policyc simulate")
+        .argument("a <b>.toml")
+        .options("--with", ["it's"]);
     let html = report::made(&page("a").html().unwrap(), &command, [("plant", "p.toml")]).unwrap();
     let typed = "policyc simulate &#39;a &lt;b&gt;.toml&#39; --with &#39;it&#39;\\&#39;&#39;s&#39;</pre>";
     assert!(html.contains(typed), "{html}");
     assert_eq!(html.matches("<section id=\"made\">").count(), 1);
-    assert_eq!(html.matches("<a href=\"#made\">").count(), html.matches("<figure").count());
+    assert_eq!(
+        html.matches("<a href=\"#made\">").count(),
+        html.matches("<figure").count()
+    );
     // and only what was told
     assert!(!page("a").html().unwrap().contains("#made"));
 }
 
 #[test]
 fn one_of_several_sections_is_picked_without_a_script() {
-    let sections = |count: usize| (0..count).map(|n| Section::new(format!("step {n}")).text("t")).collect();
+    let sections = |count: usize| {
+        (0..count)
+            .map(|n| Section::new(format!("step {n}")).text("t"))
+            .collect()
+    };
     let html = |count| {
         let section = Section::new("Load steps").pick("load step", sections(count));
         Page::new("p").section(section).html().unwrap()
@@ -249,7 +258,11 @@ fn a_picture_says_its_numbers_in_words_and_stands_in_two_widths() {
         .panel(report::BarPanel::new(Axis::new("power").unit("W")).bars("switching", [0.1]));
     let section = Section::new("s").chart(bars.svg().unwrap(), "");
     let html = Page::new("p").section(section).html().unwrap();
-    assert_eq!(html.matches("Losses. power (mW): light: switching 100.0.").count(), 2, "{html}");
+    assert_eq!(
+        html.matches("Losses. power (mW): light: switching 100.0.").count(),
+        2,
+        "{html}"
+    );
     assert!(html.contains("viewBox=\"0 0 900 ") && html.contains("viewBox=\"0 0 356 "));
 }
 

@@ -64,7 +64,10 @@ pub(crate) fn diagnose(session: &Session, wanted: &Wanted, tell: Tell) -> Result
         model: wanted.model.clone(),
         train: wanted.train.clone(),
         heldout: wanted.heldout.clone(),
-        map: Some(wanted.map.clone()).filter(|map| !map.is_empty()).into_iter().collect(),
+        map: Some(wanted.map.clone())
+            .filter(|map| !map.is_empty())
+            .into_iter()
+            .collect(),
         others: wanted.columns.iter().map(|file| ("--columns", file.clone())).collect(),
     };
     Reply::with(&answer, texts(results::files_of(&diagnosis, &asked)?))

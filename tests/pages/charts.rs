@@ -22,7 +22,11 @@ fn mouse(browser: &mut Browser, kind: &str, x: f64, y: f64) {
 }
 
 fn fingers(browser: &mut Browser, kind: &str, at: &[(f64, f64)]) {
-    let points: Vec<_> = at.iter().enumerate().map(|(id, (x, y))| json!({"x": x, "y": y, "id": id})).collect();
+    let points: Vec<_> = at
+        .iter()
+        .enumerate()
+        .map(|(id, (x, y))| json!({"x": x, "y": y, "id": id}))
+        .collect();
     browser.ask("Input.dispatchTouchEvent", json!({"type": kind, "touchPoints": points}));
 }
 
@@ -49,7 +53,10 @@ fn a_mouse_reads_values_in_all_panels_and_draws_a_stretch() {
     shown("diagnose: consistent", 1280, |browser| {
         let rest = text(browser, LEGEND);
         // at rest the legend has what the curves reach, and no empty table
-        assert!(rest.contains("lowest … highest") && rest.matches('…').count() > 4, "{rest}");
+        assert!(
+            rest.contains("lowest … highest") && rest.matches('…').count() > 4,
+            "{rest}"
+        );
         let [x, y, wide, high] = place(browser);
         mouse(browser, "mouseMoved", x + wide / 2.0, y + high / 2.0);
         let read = other_than(browser, &rest);
@@ -61,7 +68,10 @@ fn a_mouse_reads_values_in_all_panels_and_draws_a_stretch() {
         // what is reached in a tenth of the record is less than what is reached in all of it
         let stretch = text(browser, &format!("{LEGEND}.includes('lowest') && {LEGEND}"));
         assert_ne!(stretch, rest);
-        browser.value("{ document.querySelector('.tools button[aria-label=\"show the whole\"]').click(); true }", PATIENCE);
+        browser.value(
+            "{ document.querySelector('.tools button[aria-label=\"show the whole\"]').click(); true }",
+            PATIENCE,
+        );
         assert_eq!(other_than(browser, &stretch), rest);
     });
 }
@@ -69,7 +79,10 @@ fn a_mouse_reads_values_in_all_panels_and_draws_a_stretch() {
 #[test]
 fn fingers_read_values_and_zoom_on_a_phone() {
     shown("diagnose: consistent", 390, |browser| {
-        browser.ask("Emulation.setTouchEmulationEnabled", json!({"enabled": true, "maxTouchPoints": 2}));
+        browser.ask(
+            "Emulation.setTouchEmulationEnabled",
+            json!({"enabled": true, "maxTouchPoints": 2}),
+        );
         let rest = text(browser, LEGEND);
         let [x, y, wide, high] = place(browser);
         let middle = y + high / 2.0;
@@ -78,9 +91,17 @@ fn fingers_read_values_and_zoom_on_a_phone() {
         let read = other_than(browser, &rest);
         assert!(read.starts_with("time (ms) "), "{read}");
         fingers(browser, "touchEnd", &[]);
-        fingers(browser, "touchStart", &[(x + 0.4 * wide, middle), (x + 0.6 * wide, middle)]);
+        fingers(
+            browser,
+            "touchStart",
+            &[(x + 0.4 * wide, middle), (x + 0.6 * wide, middle)],
+        );
         for part in [0.35, 0.3, 0.2] {
-            fingers(browser, "touchMove", &[(x + part * wide, middle), (x + (1.0 - part) * wide, middle)]);
+            fingers(
+                browser,
+                "touchMove",
+                &[(x + part * wide, middle), (x + (1.0 - part) * wide, middle)],
+            );
         }
         fingers(browser, "touchEnd", &[]);
         mouse(browser, "mouseMoved", 2.0, 2.0);
@@ -102,7 +123,13 @@ fn keys_pick_a_load_step_and_its_chart_fits() {
             let key = json!({"type": kind, "key": "ArrowRight", "code": "ArrowRight", "windowsVirtualKeyCode": 39});
             browser.ask("Input.dispatchKeyEvent", key);
         }
-        assert_eq!(text(browser, &format!("{{ const now = {seen}; now !== '200 -> 500 W' && now }}")), "200 -> 800 W");
+        assert_eq!(
+            text(
+                browser,
+                &format!("{{ const now = {seen}; now !== '200 -> 500 W' && now }}")
+            ),
+            "200 -> 800 W"
+        );
         let fits = "document.documentElement.scrollWidth <= document.documentElement.clientWidth && [...document.querySelectorAll('.pick > section')]\
                     .find(section => section.checkVisibility()).querySelector('canvas').getBoundingClientRect().width > 250";
         browser.value(fits, PATIENCE);

@@ -20,12 +20,32 @@ const SCENARIO: &str = "plant = \"plants/paper-model.toml\"\nload_steps = [[200,
 
 /// Name, what is typed in, and the page.
 const TYPED: [(&str, &str, &str); 11] = [
-    ("simulate", "simulate simulate/sb3-buck12.toml --policy buck12 --out simulated", "simulated/report.html"),
+    (
+        "simulate",
+        "simulate simulate/sb3-buck12.toml --policy buck12 --out simulated",
+        "simulated/report.html",
+    ),
     ("train", "train training.toml --out trained", "trained/report.html"),
-    ("compile", "compile buck12 --emit c,rust --no-costs --out code --report compiled.html", "compiled.html"),
-    ("verify", "verify buck12 --generated code --drift-only --report html=verified.html", "verified.html"),
-    ("certify", "certify buck12 --format i16 --samples 50 --boxes 50 --out certified", "certified/certificate.html"),
-    ("fit", "drm fit far.csv --plant drm/plants/far.toml --trained-on plants/sb3-buck12.toml --out far.toml --report fitted.html", "fitted.html"),
+    (
+        "compile",
+        "compile buck12 --emit c,rust --no-costs --out code --report compiled.html",
+        "compiled.html",
+    ),
+    (
+        "verify",
+        "verify buck12 --generated code --drift-only --report html=verified.html",
+        "verified.html",
+    ),
+    (
+        "certify",
+        "certify buck12 --format i16 --samples 50 --boxes 50 --out certified",
+        "certified/certificate.html",
+    ),
+    (
+        "fit",
+        "drm fit far.csv --plant drm/plants/far.toml --trained-on plants/sb3-buck12.toml --out far.toml --report fitted.html",
+        "fitted.html",
+    ),
     (
         "transfer",
         "drm transfer drm/cases.toml --policy drm/policy.toml --real drm/plants/near.toml,drm/plants/far.toml --controller interpreter \
@@ -109,10 +129,17 @@ fn answer() -> Answer {
         format: policy::NumericFormat::F32,
         settings: vec!["gcc_x86_64".to_owned()],
         verdict,
-        reason: if verdict == Verdict::Proved { String::new() } else { "no prover was found".to_owned() },
+        reason: if verdict == Verdict::Proved {
+            String::new()
+        } else {
+            "no prover was found".to_owned()
+        },
         seconds: 1.5,
         tool: "Frama-C".to_owned(),
-        details: vec!["buck12.c:1234: a long line of an alarm that a prover gives, with an address and much more than fits".to_owned()],
+        details: vec![
+            "buck12.c:1234: a long line of an alarm that a prover gives, with an address and much more than fits"
+                .to_owned(),
+        ],
     };
     let policy = policy::load(&tests::example()).unwrap();
     let target = codegen::target("host").unwrap();

@@ -78,7 +78,9 @@ fn sheets(browser: &mut Browser) -> usize {
     let pdf = decoded(printed["data"].as_str().unwrap());
     // pages are objects of their own, in plain text; `/Pages` is the list of them
     let text = String::from_utf8_lossy(&pdf);
-    text.match_indices("/Type /Page").filter(|(at, _)| !text[at + 11..].starts_with('s')).count()
+    text.match_indices("/Type /Page")
+        .filter(|(at, _)| !text[at + 11..].starts_with('s'))
+        .count()
 }
 
 /// Base64 (RFC 4648, section 4).
@@ -116,7 +118,11 @@ fn every_page_can_be_read_on_a_phone_in_the_dark_by_a_screen_reader_and_on_paper
             for is_dark in [false, true] {
                 open(&mut browser, page, width, is_dark);
                 let found = faults(&mut browser, rules.as_deref());
-                wrong.extend(found.iter().map(|fault| format!("{name} at {width}, dark {is_dark}: {fault}")));
+                wrong.extend(
+                    found
+                        .iter()
+                        .map(|fault| format!("{name} at {width}, dark {is_dark}: {fault}")),
+                );
             }
         }
         let sheets = sheets(&mut browser);
@@ -125,7 +131,10 @@ fn every_page_can_be_read_on_a_phone_in_the_dark_by_a_screen_reader_and_on_paper
         }
         let text = std::fs::read_to_string(page).unwrap();
         if let Some(at) = text.find(&temporary.path().display().to_string()) {
-            wrong.push(format!("{name} names this machine: {}", &text[at..(at + 80).min(text.len())]));
+            wrong.push(format!(
+                "{name} names this machine: {}",
+                &text[at..(at + 80).min(text.len())]
+            ));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -150,7 +159,12 @@ fn planted_faults_of_a_page_are_found() {
     open(&mut browser, &page, 390, false);
     let rules = rules();
     let found = faults(&mut browser, rules.as_deref()).join("\n");
-    let mut expected = vec!["sticks out", "letters of 4.0 pixels: small", "cut: cut off", "without a number in words"];
+    let mut expected = vec![
+        "sticks out",
+        "letters of 4.0 pixels: small",
+        "cut: cut off",
+        "without a number in words",
+    ];
     expected.extend(rules.map(|_| "color-contrast"));
     for words in expected {
         assert!(found.contains(words), "{words} in {found}");

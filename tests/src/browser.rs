@@ -27,7 +27,10 @@ impl Browser {
     #[must_use]
     pub fn is_there() -> bool {
         let mut browser = Command::new("timeout");
-        browser.args(["60", "chromium", "--dump-dom"]).args(FLAGS).arg("about:blank");
+        browser
+            .args(["60", "chromium", "--dump-dom"])
+            .args(FLAGS)
+            .arg("about:blank");
         browser.output().is_ok_and(|output| output.status.success())
     }
 

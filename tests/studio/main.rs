@@ -218,8 +218,13 @@ fn a_model_of_a_trainer_is_dropped_and_becomes_a_contract() {
     let server = Server::of(&site);
     let mut browser = Browser::start(&temporary.path().join("profile"));
     for name in ["sb3_dqn.zip", "gemm.onnx"] {
-        browser.ask("Page.navigate", serde_json::json!({ "url": format!("{}?{name}#contract", server.1) }));
-        let ready = format!("location.search === '?{name}' && document.getElementById('status')?.textContent.startsWith('Ready')");
+        browser.ask(
+            "Page.navigate",
+            serde_json::json!({ "url": format!("{}?{name}#contract", server.1) }),
+        );
+        let ready = format!(
+            "location.search === '?{name}' && document.getElementById('status')?.textContent.startsWith('Ready')"
+        );
         browser.value(&ready, PATIENCE);
         let drop = format!(
             "fetch('examples/{name}').then((answer) => answer.blob()).then((blob) => {{ const data = new DataTransfer(); \
@@ -238,12 +243,27 @@ fn the_views_are_reached_by_keys() {
     let temporary = tempfile::tempdir().unwrap();
     let server = Server::of(&folder);
     let mut browser = Browser::start(temporary.path());
-    browser.ask("Page.navigate", serde_json::json!({ "url": format!("{}#contract", server.1) }));
-    browser.value("document.getElementById('status')?.textContent.startsWith('Ready')", PATIENCE);
+    browser.ask(
+        "Page.navigate",
+        serde_json::json!({ "url": format!("{}#contract", server.1) }),
+    );
+    browser.value(
+        "document.getElementById('status')?.textContent.startsWith('Ready')",
+        PATIENCE,
+    );
     browser.value("{ document.getElementById('tab-contract').focus(); true }", PATIENCE);
-    for (key, view) in [("ArrowRight", "code"), ("End", "records"), ("ArrowRight", "contract"), ("ArrowLeft", "records"), ("Home", "contract")] {
+    for (key, view) in [
+        ("ArrowRight", "code"),
+        ("End", "records"),
+        ("ArrowRight", "contract"),
+        ("ArrowLeft", "records"),
+        ("Home", "contract"),
+    ] {
         for kind in ["keyDown", "keyUp"] {
-            browser.ask("Input.dispatchKeyEvent", serde_json::json!({ "type": kind, "key": key, "code": key }));
+            browser.ask(
+                "Input.dispatchKeyEvent",
+                serde_json::json!({ "type": kind, "key": key, "code": key }),
+            );
         }
         let shown = format!(
             "document.activeElement.id === 'tab-{view}' && !document.getElementById('panel-{view}').hidden && location.hash === '#{view}'"

@@ -39,7 +39,10 @@ pub fn page(settings: &Settings, runs: &[SeedRun], best: &Outcome) -> Result<Str
         Some(svg) => decided.chart_or_reason(svg, caption),
         None => decided.text("A policy of one signal has no map."),
     };
-    let report = best.files.get("report.txt").map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    let report = best
+        .files
+        .get("report.txt")
+        .map(|bytes| String::from_utf8_lossy(bytes).into_owned());
     decided = decided.details(Section::new("Report of the best seed").code(report.unwrap_or_default()));
     page.section(decided).html().map_err(crate::faults::told)
 }
@@ -83,7 +86,9 @@ fn seeds(settings: &Settings, runs: &[SeedRun], best: &Outcome) -> Section {
         .number("cost in selection", 3);
     for outcome in outcomes(runs) {
         let worst = Worst::of(&outcome.findings);
-        let run = runs.iter().find(|run| run.outcome.as_ref().is_some_and(|own| own.seed == outcome.seed));
+        let run = runs
+            .iter()
+            .find(|run| run.outcome.as_ref().is_some_and(|own| own.seed == outcome.seed));
         let met = match (settings.specification.is_empty(), outcome.evaluated.met) {
             (true, _) => "none",
             (false, true) => "met",
@@ -133,17 +138,27 @@ fn over(runs: &[SeedRun], mut panel: Panel, figure: fn(&Look) -> f64) -> Panel {
 
 fn courses(runs: &[SeedRun]) -> Result<Svg, report::ReportError> {
     Chart::new("On the way", Axis::new("control periods"))
-        .panel(over(runs, Panel::new(Axis::new("mean error").unit("V")).height(150.0), |look| look.error))
-        .panel(over(runs, Panel::new(Axis::new("mean reward")).height(110.0), |look| look.reward))
+        .panel(over(
+            runs,
+            Panel::new(Axis::new("mean error").unit("V")).height(150.0),
+            |look| look.error,
+        ))
+        .panel(over(runs, Panel::new(Axis::new("mean reward")).height(110.0), |look| {
+            look.reward
+        }))
         .svg()
 }
 
 fn costs(settings: &Settings, runs: &[SeedRun]) -> Result<Svg, report::ReportError> {
-    let mut panel = over(runs, Panel::new(Axis::new("cost").log()).height(200.0), |look| look.cost);
+    let mut panel = over(runs, Panel::new(Axis::new("cost").log()).height(200.0), |look| {
+        look.cost
+    });
     if !settings.specification.is_empty() {
         panel = panel.y_line(1.0, "specification");
     }
-    Chart::new("Cost on the selection scenarios", Axis::new("control periods")).panel(panel).svg()
+    Chart::new("Cost on the selection scenarios", Axis::new("control periods"))
+        .panel(panel)
+        .svg()
 }
 
 /// Every limit, and the figure of the best seed's evaluation that comes nearest to it or exceeds it most.
@@ -165,7 +180,9 @@ fn specification(settings: &Settings, best: &Outcome) -> Section {
             };
             figures(metrics, requirement)
         };
-        let concerned: Vec<usize> = (0..best.findings.len()).filter(|n| scoring.concerns(requirement, *n)).collect();
+        let concerned: Vec<usize> = (0..best.findings.len())
+            .filter(|n| scoring.concerns(requirement, *n))
+            .collect();
         let Some(first) = concerned.first() else { continue };
         for (row, (name, _, limit)) in of(*first).into_iter().enumerate() {
             let value = |n: &usize| of(*n).get(row).map_or(f64::NAN, |(_, value, _)| *value);
@@ -177,13 +194,22 @@ fn specification(settings: &Settings, best: &Outcome) -> Section {
                 name.into(),
                 words(requirement).into(),
                 if found <= limit { "yes" } else { "NO" }.into(),
-                report::quantity(found, "", 4).into(),
-                report::quantity(limit, "", 4).into(),
+                report::quantity(found, unit(name), 4).into(),
+                report::quantity(limit, unit(name), 4).into(),
                 best.findings[*worst].step().to_string().into(),
             ]);
         }
     }
     Section::new("Specification").table(table)
+}
+
+/// Of a figure that is limited, by its key in the training file.
+fn unit(key: &str) -> &'static str {
+    match key {
+        "deviation" | "tail" => "V",
+        "settling" => "s",
+        _ => "",
+    }
 }
 
 fn words(requirement: &Requirement) -> String {
@@ -203,7 +229,9 @@ fn map(policy: &Policy, v_ref: f64) -> Result<Option<Result<Svg, report::ReportE
         return Ok(None);
     };
     let centres = |low: f64, high: f64| -> Vec<f64> {
-        (0..CELLS).map(|n| low + (high - low) * (n as f64 + 0.5) / CELLS as f64).collect()
+        (0..CELLS)
+            .map(|n| low + (high - low) * (n as f64 + 0.5) / CELLS as f64)
+            .collect()
     };
     let axis = |signal: &policy::Signal| {
         let (low, high) = (signal.range.low, signal.range.high);
@@ -214,7 +242,11 @@ fn map(policy: &Policy, v_ref: f64) -> Result<Option<Result<Svg, report::ReportE
         }
     };
     let (x, y) = ((0, axis(first)), (1, axis(second)));
-    let middle: Vec<f64> = policy.signals.iter().map(|signal| 0.5 * (signal.range.low + signal.range.high)).collect();
+    let middle: Vec<f64> = policy
+        .signals
+        .iter()
+        .map(|signal| 0.5 * (signal.range.low + signal.range.high))
+        .collect();
     let found = decision_map(policy, &x, &y, &middle)?;
     let named = |signal: &policy::Signal| Axis::new(signal.name.as_str()).unit(signal.unit.as_str());
     let picture = HeatMap::new("Decisions", named(first), named(second))

@@ -411,7 +411,11 @@ impl Plan {
         }
         if !self.npm.is_empty() {
             let folder = npm(target_dir);
-            lines.push(format!("    npm install --prefix {} {}", folder.display(), self.npm.join(" ")));
+            lines.push(format!(
+                "    npm install --prefix {} {}",
+                folder.display(),
+                self.npm.join(" ")
+            ));
         }
         lines.join("\n")
     }

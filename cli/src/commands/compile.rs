@@ -14,8 +14,8 @@ use verify::costs::{Entry, StepCosts};
 use verify::fmu::Archive;
 use verify::{Files, advice};
 
-use crate::arguments::Compile;
 use super::compile_page;
+use crate::arguments::Compile;
 use crate::failure::Failure;
 use crate::made;
 use crate::outcome::Outcome;
@@ -86,7 +86,11 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
         None => Vec::new(),
     };
     if let Some(path) = &options.report {
-        output::replace_own_one(path, &page(options, &policy, &made, &costs, &budget)?, options.replacing)?;
+        output::replace_own_one(
+            path,
+            &page(options, &policy, &made, &costs, &budget)?,
+            options.replacing,
+        )?;
     }
     if options.json {
         say_json(options, &policy, &made, &costs, budget)?;
@@ -122,7 +126,10 @@ fn page(
         sizes: &sizes,
         contract: (&path.display().to_string(), &text),
         files: &made.files,
-        written: files.iter().map(|(name, content)| (name.clone(), content.len())).collect(),
+        written: files
+            .iter()
+            .map(|(name, content)| (name.clone(), content.len()))
+            .collect(),
         costs: &made.costs,
         cost_texts: costs,
         clock: options.clock,

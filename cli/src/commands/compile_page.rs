@@ -55,8 +55,15 @@ fn verdict(shown: &Shown<'_>) -> (Verdict, &'static str, String) {
         bytes(*state_bytes)
     );
     // the build that is done first decides: who is in a hurry takes that one
-    let budget = |clock| shown.costs.measured().filter_map(move |costs| Budget::of(costs, clock, shown.policy.sample_period));
-    let soonest = shown.clock.and_then(|clock| budget(clock).min_by(|a, b| a.share.1.total_cmp(&b.share.1)));
+    let budget = |clock| {
+        shown
+            .costs
+            .measured()
+            .filter_map(move |costs| Budget::of(costs, clock, shown.policy.sample_period))
+    };
+    let soonest = shown
+        .clock
+        .and_then(|clock| budget(clock).min_by(|a, b| a.share.1.total_cmp(&b.share.1)));
     let Some(budget) = soonest else {
         return (Verdict::Note, "", sizes);
     };
@@ -86,13 +93,15 @@ fn needs(shown: &Shown<'_>) -> Section {
     ]);
     let measured: Vec<_> = shown.costs.measured().collect();
     if !measured.is_empty() {
-        let mut table = Table::new("Each build under the target's emulator: instructions and memory are counted, cycles are a model")
-            .text("build")
-            .text("flash")
-            .text("static RAM")
-            .text("stack")
-            .text("instructions")
-            .text("model cycles");
+        let mut table = Table::new(
+            "Each build under the target's emulator: instructions and memory are counted, cycles are a model",
+        )
+        .text("build")
+        .text("flash")
+        .text("static RAM")
+        .text("stack")
+        .text("instructions")
+        .text("model cycles");
         for costs in &measured {
             let from_to = |(least, most): (u64, u64)| match least == most {
                 true => grouped(most),
@@ -137,11 +146,18 @@ fn layers(policy: &Policy) -> Section {
         ]);
     }
     let names = policy.layers.iter().map(|layer| layer.name.as_str());
-    let macs: Vec<f64> = policy.layers.iter().map(|layer| (layer.inputs * layer.outputs) as f64).collect();
+    let macs: Vec<f64> = policy
+        .layers
+        .iter()
+        .map(|layer| (layer.inputs * layer.outputs) as f64)
+        .collect();
     let svg = BarChart::new("Where the time goes", names)
         .panel(BarPanel::new(Axis::new("multiply-accumulates")).bars("", macs))
         .svg();
-    Section::new("Layers").table(table).chart_or_reason(svg, "Products of each layer in a step, neurons that are always 0 included.")
+    Section::new("Layers").table(table).chart_or_reason(
+        svg,
+        "Products of each layer in a step, neurons that are always 0 included.",
+    )
 }
 
 /// A part of the contract, and where it stands in the code.
@@ -162,16 +178,21 @@ fn lines(shown: &Shown<'_>) -> Section {
         return section.text("No C was made; this table is of C alone.");
     };
     let (path, text) = shown.contract;
-    let mut table = Table::new(format!("Lines of {path} and of {file}, where each value is stored or each step begins"))
-        .text("part")
-        .number("contract", 0)
-        .number("code", 0)
-        .text("as it stands there");
+    let mut table = Table::new(format!(
+        "Lines of {path} and of {file}, where each value is stored or each step begins"
+    ))
+    .text("part")
+    .number("contract", 0)
+    .number("code", 0)
+    .text("as it stands there");
     for part in parts(policy) {
         let found = code.lines().enumerate().find(|(_, line)| line.contains(&part.mark));
         let Some((index, line)) = found else { continue };
         let (heading, before) = part.heading;
-        let own = text.lines().enumerate().filter(|(_, line)| line.trim_start().starts_with(heading));
+        let own = text
+            .lines()
+            .enumerate()
+            .filter(|(_, line)| line.trim_start().starts_with(heading));
         let own = own.map(|(index, _)| index + 1).nth(before);
         table = table.row([
             part.name.into(),

@@ -38,7 +38,11 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     if let Ok(mut shown) = shown.lock() {
         shown.line.clear();
     }
-    output::replace_own_texts(&options.out, &results::files_of(&diagnosis, &asked(options))?, options.replacing)?;
+    output::replace_own_texts(
+        &options.out,
+        &results::files_of(&diagnosis, &asked(options))?,
+        options.replacing,
+    )?;
     let named: Vec<&Path> = options
         .train
         .iter()
@@ -85,7 +89,9 @@ fn asked(options: &Diagnose) -> Asked {
         ("--scenario", &options.scenario),
         ("--trained-on", &options.trained_on),
     ];
-    let given = files.into_iter().filter_map(|(name, file)| Some((name, path(file.as_ref()?))));
+    let given = files
+        .into_iter()
+        .filter_map(|(name, file)| Some((name, path(file.as_ref()?))));
     let settled = options.settled.then(|| ("--settled", String::new()));
     Asked {
         model: path(&options.model),

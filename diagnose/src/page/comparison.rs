@@ -140,7 +140,9 @@ fn coloured(errors: &[f64]) -> Option<usize> {
 pub(super) fn volts(list: &[Compared]) -> Option<String> {
     let best = |one: &&Compared| (one.heldout, one.channel == CHANNEL_NAMES[0]);
     let first = list.iter().map(|one| best(&one)).max()?;
-    let all = list.iter().filter(|one| best(one) == first && one.before.rmse.is_finite());
+    let all = list
+        .iter()
+        .filter(|one| best(one) == first && one.before.rmse.is_finite());
     let worst = all.max_by(|a, b| a.before.chi2_per_value.total_cmp(&b.before.chi2_per_value))?;
     let kind = if worst.heldout { "held-out" } else { "training" };
     let [before, noise] = [worst.before.rmse, worst.noise].map(|value| si(value, worst.unit));
@@ -181,10 +183,13 @@ pub(super) fn section(list: &[Compared]) -> Section {
             row.push(figure(&one.before).into());
             row.extend(is_second.then(|| one.after.as_ref().map_or(f64::NAN, figure).into()));
         }
-        let lags = |fit: &Fit| fit.coloured_lags.map_or_else(|| "–".to_owned(), |count| count.to_string());
+        let lags = |fit: &Fit| {
+            fit.coloured_lags
+                .map_or_else(|| "–".to_owned(), |count| count.to_string())
+        };
         let white = match &one.after {
-            Some(after) => format!("{} → {}", lags(&one.before), lags(after)),
-            None => lags(&one.before),
+            Some(after) if after.coloured_lags.is_some() => format!("{} → {}", lags(&one.before), lags(after)),
+            _ => lags(&one.before),
         };
         row.extend([one.noise.into(), one.unit.into(), white.into()]);
         table = table.row(row);

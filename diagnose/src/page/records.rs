@@ -159,7 +159,15 @@ pub(super) fn training(diagnosis: &Diagnosis) -> Option<Section> {
         _ => "Training records, measured and simulated",
     };
     let states = [before, after];
-    let mut section = pictures(Section::new(title), problem, states, worst, second, &also(worst), caption);
+    let mut section = pictures(
+        Section::new(title),
+        problem,
+        states,
+        worst,
+        second,
+        &also(worst),
+        caption,
+    );
     let models = spectrum::models(before, after, second);
     let measured = |n: &usize| problem.records[worst].measured[*n].iter().any(|v| v.is_finite());
     let shown: Vec<usize> = channels(&also(worst)).filter(measured).collect();

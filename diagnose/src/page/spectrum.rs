@@ -28,7 +28,10 @@ pub(super) fn picture(
         return None;
     }
     let spacing = (one.time[one.rows() - 1] - one.time[0]) / (one.rows() - 1) as f64;
-    let is_even = one.time.windows(2).all(|pair| ((pair[1] - pair[0]) / spacing - 1.0).abs() < 0.01);
+    let is_even = one
+        .time
+        .windows(2)
+        .all(|pair| ((pair[1] - pair[0]) / spacing - 1.0).abs() < 0.01);
     if !is_even {
         return None;
     }
@@ -58,7 +61,11 @@ pub(super) fn picture(
 }
 
 /// The models of a picture.
-pub(super) fn models<'a>(before: &'a State, after: &'a State, second: Option<&'a str>) -> Vec<(&'a str, &'a State, Colour)> {
+pub(super) fn models<'a>(
+    before: &'a State,
+    after: &'a State,
+    second: Option<&'a str>,
+) -> Vec<(&'a str, &'a State, Colour)> {
     let first = ("model", before, MODEL);
     std::iter::once(first)
         .chain(second.map(|name| (name, after, EXTENDED)))
@@ -107,9 +114,14 @@ mod tests {
     #[test]
     fn a_sine_has_its_amplitude_at_its_frequency() {
         // 40 periods in 512 rows of 10 us: 7812.5 Hz
-        let values: Vec<f64> = (0..1500).map(|n| 0.3 * libm::sin(TAU * 40.0 * f64::from(n) / 512.0)).collect();
+        let values: Vec<f64> = (0..1500)
+            .map(|n| 0.3 * libm::sin(TAU * 40.0 * f64::from(n) / 512.0))
+            .collect();
         let (frequency, amplitude) = amplitudes(&values, 1e-5);
-        let (at, most) = amplitude.iter().enumerate().fold((0, 0.0), |best, (n, a)| if *a > best.1 { (n, *a) } else { best });
+        let (at, most) = amplitude
+            .iter()
+            .enumerate()
+            .fold((0, 0.0), |best, (n, a)| if *a > best.1 { (n, *a) } else { best });
         assert!((frequency[at] - 7812.5).abs() < 1e-6, "{}", frequency[at]);
         assert!((most - 0.3).abs() < 1e-9, "{most}");
     }

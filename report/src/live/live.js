@@ -28,7 +28,9 @@
 
   // labels of an axis, with as many digits as their distance needs
   const labels = (ticks, step) => {
-    const digits = Math.min(9, Math.max(0, -Math.floor(Math.log10(step || 1) + 1e-9)));
+    let digits = 0;
+    // a step of 0.025 has three
+    while (digits < 9 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6 * step * 10 ** digits) digits++;
     return ticks.map(value => value === null ? "" : value.toFixed(digits).replace(/^-(?=[0.]*[1-9])/, "−").replace(/^-/, ""));
   };
 
@@ -133,7 +135,7 @@
 
     // room for the numbers of a vertical axis, with the digit more that a stretch needs
     widest({ low, high }) {
-      const longest = Math.max(...labels([low, high], (high - low) / 50).map(text => text.length));
+      const longest = Math.max(...labels([low, high], 10 ** Math.floor(Math.log10((high - low) / 50 || 1))).map(text => text.length));
       return Math.max(40, 14 + 7 * longest);
     }
 

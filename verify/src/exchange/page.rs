@@ -14,7 +14,7 @@ pub(super) fn text(policy: &str, cases: &[Case]) -> Result<String, ReportError> 
         (0, _) => (Colour::Pass, "equal"),
         _ => (Colour::Fail, "different"),
     };
-    let mut sentence = format!("Of {} comparisons {passed} hold and {failed} do not.", passed + failed);
+    let mut sentence = format!("Comparisons that hold: {passed} of {}.", passed + failed);
     if skipped > 0 {
         sentence.push_str(&format!(" {skipped} could not be made here."));
     }
@@ -42,7 +42,11 @@ fn section(kind: Kind, own: &[&Case]) -> Section {
         let is_long = text.contains('\n');
         let short = if is_long { "see below" } else { text };
         let name = if case.name.is_empty() { "all files" } else { &case.name };
-        table = table.row([name, word, &format!("{}:{}", case.file, case.line), short].map(Cell::from));
+        let place = match case.verdict {
+            Verdict::Failed(_) => format!("{}:{}", case.file, case.line),
+            _ => case.file.trim_end_matches('/').to_owned(),
+        };
+        table = table.row([name, word, &place, short].map(Cell::from));
         if is_long {
             has_long = true;
             found = found.text(format!("{name}:")).code(text);
@@ -62,8 +66,14 @@ mod tests {
     #[test]
     fn the_page_says_what_differs_and_where() {
         let text = text("buck", &cases()).expect("a page");
-        assert!(text.contains("different") && text.contains("Of 2 comparisons 1 hold and 1 do not. 1 could not be made here."));
-        assert!(text.contains("gen, new/a b.c:7") && text.contains("a &lt; b &amp;&amp;") && text.contains("clang is not installed"));
+        assert!(
+            text.contains("different") && text.contains("Comparisons that hold: 1 of 2. 1 could not be made here.")
+        );
+        assert!(
+            text.contains("gen, new/a b.c:7")
+                && text.contains("a &lt; b &amp;&amp;")
+                && text.contains("clang is not installed")
+        );
     }
 
     #[test]

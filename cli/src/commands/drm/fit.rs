@@ -43,7 +43,8 @@ pub fn run(options: &Fit) -> Result<Outcome, Failure> {
 /// None in practice.
 pub fn signed(options: &Fit, made: &Made) -> Result<Option<String>, Failure> {
     let read = [("table", options.table.display().to_string())];
-    let signed = |page: &String| crate::made::signed_page(page, &[("--out", "drm.toml"), ("--report", "report.html")], &read);
+    let signed =
+        |page: &String| crate::made::signed_page(page, &[("--out", "drm.toml"), ("--report", "report.html")], &read);
     made.page.as_ref().map(signed).transpose()
 }
 

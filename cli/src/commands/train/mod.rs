@@ -7,7 +7,9 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use toml_input::{FileName, Message};
 use train::summary::Summary;
-use train::{Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, page, seeds, tables, train_all};
+use train::{
+    Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, page, seeds, tables, train_all,
+};
 
 use crate::arguments::Train;
 use crate::failure::Failure;

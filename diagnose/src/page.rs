@@ -148,7 +148,7 @@ fn causes(diagnosis: &Diagnosis) -> Section {
         section = section.text("The best of the known causes leave structure and are not named as causes:");
         section = section.table(table("Partial explanation", &findings.partial));
         section =
-            section.text("What it would gain stands in the table above, under after. None of it is an explanation.");
+            section.text("What they would gain stands in the first table, under after. None of it is an explanation.");
     }
     if let Some(aside) = &findings.set_aside {
         section = section.text(format!(

@@ -3,13 +3,15 @@
 use report::{Section, Table};
 use serde::Serialize;
 
-use super::{empirical, records};
+use super::empirical;
+use super::records::{self, PARTLY};
 use crate::diagnosis::Diagnosis;
 use crate::fit::State;
 use crate::noise::channel;
 use crate::problem::{LOST, Problem};
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
 use crate::words::si;
+use crate::worth::Worth;
 
 /// Lags at which a residual is held against itself: two blocks of [`crate::noise`], as its inflation has.
 const LAGS: usize = 20;
@@ -64,7 +66,26 @@ pub fn compared(diagnosis: &Diagnosis) -> Vec<Compared> {
     }
     let states = [&diagnosis.given, diagnosis.attribution.state()];
     of(&diagnosis.problem, states, records::second(diagnosis), false, &mut list);
+    list.iter_mut().for_each(|one| partly(one, diagnosis));
     list
+}
+
+/// Of a held-out record, what explains a part is known by its errors alone: no simulation of it is kept.
+fn partly(one: &mut Compared, diagnosis: &Diagnosis) {
+    let worths = &diagnosis.findings.partial_gain;
+    let own = |worth: &&Worth| (worth.heldout, worth.channel, &worth.record) == (true, one.channel, &one.record);
+    if let (true, None, Some(worth)) = (one.heldout, one.second, worths.iter().find(own)) {
+        let over = worth.rmse_after / one.noise;
+        // the spread of the channel, from the fit that is known
+        let spread = one.before.rmse / (1.0 - one.before.fit_percent / 100.0);
+        one.second = Some(PARTLY);
+        one.after = Some(Fit {
+            rmse: worth.rmse_after,
+            fit_percent: 100.0 * (1.0 - worth.rmse_after / spread),
+            chi2_per_value: over * over,
+            coloured_lags: None,
+        });
+    }
 }
 
 fn of(
@@ -149,11 +170,21 @@ pub(super) fn volts(list: &[Compared]) -> Option<String> {
     let what = format!("In {} of the {kind} record {}", worst.channel, worst.record);
     Some(match (worst.second, worst.after) {
         (Some(second), Some(after)) if after.rmse.is_finite() => format!(
-            "{what} the error is {before} rms with the model as given and {} with the model that is {second}; the noise is {noise}.",
-            si(after.rmse, worst.unit)
+            "{what} the error is {before} rms with the model as given and {} {}; the noise is {noise}.",
+            si(after.rmse, worst.unit),
+            phrase(second)
         ),
         _ => format!("{what} the error of the model as given is {before} rms; the noise is {noise}."),
     })
+}
+
+/// A second model in a sentence.
+fn phrase(second: &str) -> String {
+    match second {
+        second if second.starts_with("with ") => second.to_owned(),
+        PARTLY => format!("with the {PARTLY}"),
+        second => format!("with the {second} model"),
+    }
 }
 
 /// The table of all of it.

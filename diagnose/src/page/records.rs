@@ -131,11 +131,14 @@ pub(super) fn pictures(
     section
 }
 
+/// What the second simulation is where nothing explains the records.
+pub(super) const PARTLY: &str = "best of the known causes";
+
 /// What the second simulation is, if there is one.
 pub(super) fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
     diagnosis.attribution.best.as_ref()?;
     Some(match diagnosis.findings.verdict {
-        Verdict::Unexplained => "best of the known causes",
+        Verdict::Unexplained => PARTLY,
         _ => "extended",
     })
 }

@@ -225,9 +225,11 @@ pub(super) fn section(list: &[Compared]) -> Section {
         row.extend([one.noise.into(), one.unit.into(), white.into()]);
         table = table.row(row);
     }
-    let words = match is_second {
-        true => "Before is the model as given, after the model with what was found.",
-        false => "The model as given; there is no second one.",
+    let is_part = list.iter().any(|one| one.second == Some(PARTLY));
+    let words = match (is_second, is_part) {
+        (_, true) => "Before is the model as given, after the model with the best of the known causes, which is no explanation.",
+        (true, false) => "Before is the model as given, after the model with what was found.",
+        (false, false) => "The model as given; there is no second one.",
     };
     Section::new("How well the model fits").text(words).table(table).text(format!(
         "Fit is 100 % less the error over what the channel moves. Chi²/N is 1 where only noise is left. The last column counts of the \

@@ -1,6 +1,7 @@
 //! What a picture shows, in words and numbers: for who does not see it.
 
 use crate::axis::Settled;
+use crate::bars::BarPanel;
 use crate::chart::Panel;
 use crate::number::{quantity, shifted};
 
@@ -35,12 +36,12 @@ pub fn map(title: &str, x: &Settled, y: &Settled, value: &Settled, cells: &[f64]
     format!("{title}. {label} {values}, over {} and {}.", over[0], over[1])
 }
 
-/// Title, and the values of every category.
-pub fn bars(title: &str, panels: &[(&Settled, &[(String, Vec<f64>)])], categories: &[String]) -> String {
+/// Title, and the values of every category; one axis for each panel.
+pub fn bars(title: &str, axes: &[Settled], panels: &[BarPanel], categories: &[String]) -> String {
     let mut text = title.to_owned();
-    for (axis, series) in panels {
+    for (axis, panel) in axes.iter().zip(panels) {
         let of = |n: usize| {
-            let values = series.iter().filter_map(|(name, values)| {
+            let values = panel.series.iter().filter_map(|(name, values, _)| {
                 let value = number(axis, *values.get(n)?, false)?;
                 Some(format!("{name} {value}").trim_start().to_owned())
             });

@@ -38,7 +38,7 @@ pub struct BarChart {
 #[derive(Debug, Clone)]
 pub struct BarPanel {
     axis: Axis,
-    series: Vec<(String, Vec<f64>, Option<Colour>)>,
+    pub(crate) series: Vec<(String, Vec<f64>, Option<Colour>)>,
 }
 
 impl BarPanel {
@@ -141,17 +141,7 @@ impl BarChart {
     }
 
     fn alt(&self, axes: &[Settled]) -> String {
-        let panels: Vec<Vec<(String, Vec<f64>)>> = (self.panels.iter())
-            .map(|panel| {
-                panel
-                    .series
-                    .iter()
-                    .map(|(name, values, _)| (name.clone(), values.clone()))
-                    .collect()
-            })
-            .collect();
-        let panels: Vec<_> = axes.iter().zip(panels.iter().map(Vec::as_slice)).collect();
-        alt::bars(&self.title, &panels, &self.categories)
+        alt::bars(&self.title, axes, &self.panels, &self.categories)
     }
 
     fn entries(&self) -> Vec<Entry> {

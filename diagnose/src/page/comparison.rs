@@ -227,7 +227,9 @@ pub(super) fn section(list: &[Compared]) -> Section {
     }
     let is_part = list.iter().any(|one| one.second == Some(PARTLY));
     let words = match (is_second, is_part) {
-        (_, true) => "Before is the model as given, after the model with the best of the known causes, which is no explanation.",
+        (_, true) => {
+            "Before is the model as given, after the model with the best of the known causes, which is no explanation."
+        }
         (true, false) => "Before is the model as given, after the model with what was found.",
         (false, false) => "The model as given; there is no second one.",
     };

@@ -57,7 +57,7 @@ pub fn signed_page(page: &str, out: Out<'_>, read: &[(&'static str, String)]) ->
 }
 
 fn command(typed: &[String], out: Out<'_>) -> Option<CommandLine> {
-    let mut words = typed.iter().map(String::as_str).peekable();
+    let mut words = typed.iter().map(String::as_str);
     let mut name = format!("policyc {}", words.next()?);
     if name == "policyc drm" {
         name = format!("{name} {}", words.next()?);
@@ -67,11 +67,11 @@ fn command(typed: &[String], out: Out<'_>) -> Option<CommandLine> {
         let is_left_out = |option: &&str| word.strip_prefix(*option).is_some_and(|rest| rest.starts_with('='));
         if WITH_VALUE.contains(&word) {
             words.next();
-        } else if WITHOUT_VALUE.contains(&word) || WITH_VALUE.iter().any(|option| is_left_out(&option)) {
-        } else if word.starts_with("--") {
-            command = command.flag(word, true);
-        } else {
-            command = command.argument(word);
+        } else if !WITHOUT_VALUE.contains(&word) && !WITH_VALUE.iter().any(is_left_out) {
+            command = match word.starts_with("--") {
+                true => command.flag(word, true),
+                false => command.argument(word),
+            };
         }
     }
     Some(

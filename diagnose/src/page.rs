@@ -13,7 +13,7 @@ use report::{Axis, BarChart, BarPanel, Chart, Page, Panel, ReportError, Section,
 use self::colours::{EXTENDED, MODEL};
 use crate::diagnosis::Diagnosis;
 use crate::findings::{Named, Verdict};
-use crate::gain::{Regime, Shift};
+use crate::gain::{Pair, Regime, Shift};
 use crate::noise::channel;
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS};
 use crate::words::{needs, si, unit};
@@ -290,6 +290,13 @@ fn held_out(diagnosis: &Diagnosis) -> Option<Section> {
         row.extend(is_extended.then(|| removed.into()));
         table = table.row(row);
     }
+    section = section.details(Section::new("By record and regime").table(table));
+    Some(held_pictures(section, diagnosis, pair))
+}
+
+/// The held-out record that the model as given misses most, and the others behind a click.
+fn held_pictures(section: Section, diagnosis: &Diagnosis, pair: &Pair) -> Section {
+    let second = comparison::second_held(diagnosis);
     let square = |record: usize| {
         let own = (0..CHANNELS).flat_map(|n| channel(&pair.problem, &pair.before.residual, record, n));
         own.map(|v| v * v).sum::<f64>() / pair.problem.records[record].rows().max(1) as f64
@@ -301,21 +308,19 @@ fn held_out(diagnosis: &Diagnosis) -> Option<Section> {
         shifts.filter_map(place).collect::<Vec<_>>()
     };
     let count = pair.problem.records.len();
-    let worst = (0..count).max_by(|a, b| square(*a).total_cmp(&square(*b)))?;
+    let worst = (0..count).max_by(|a, b| square(*a).total_cmp(&square(*b))).unwrap_or(0);
     let draw = |section: Section, record: usize, caption: &str| {
         let states = [&pair.before, &pair.after];
         records::pictures(section, &pair.problem, states, record, second, &also(record), caption)
     };
     let caption = "The held-out record that the model as given misses most. No fit has seen it; its initial state is estimated for each model.";
-    section = draw(section, worst, caption).details(Section::new("By record and regime").table(table));
-    if count > 1 {
-        let mut inner = Section::new("The other held-out records");
-        for record in (0..count).filter(|record| *record != worst) {
-            inner = draw(inner, record, "");
-        }
-        section = section.details(inner);
+    let section = draw(section, worst, caption);
+    if count < 2 {
+        return section;
     }
-    Some(section)
+    let others = (0..count).filter(|record| *record != worst);
+    let inner = Section::new("The other held-out records");
+    section.details(others.fold(inner, |inner, record| draw(inner, record, "")))
 }
 
 fn noise(diagnosis: &Diagnosis) -> Section {

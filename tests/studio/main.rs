@@ -232,7 +232,7 @@ fn a_model_of_a_trainer_is_dropped_and_becomes_a_contract() {
              document.documentElement.dispatchEvent(new DragEvent('drop', {{ dataTransfer: data, bubbles: true, cancelable: true }})); return true; }})"
         );
         browser.value(&drop, PATIENCE);
-        let contract = browser.value("document.getElementById('edit').value", PATIENCE);
+        let contract = browser.value("document.getElementById('edit').value || null", PATIENCE);
         assert!(contract.as_str().unwrap().contains("[network]"), "{name}: {contract}");
     }
 }

@@ -12,6 +12,7 @@ use crate::arguments::drm::Drm;
 use crate::arguments::{Arguments, Command, Engine, Outside};
 use crate::commands;
 use crate::failure::Failure;
+use crate::made;
 pub use crate::ownership::Replacing;
 
 pub use crate::campaign::{
@@ -44,6 +45,8 @@ pub fn load(path: &Path, allow_outside: bool, format: Option<NumericFormat>) -> 
 /// # Errors
 /// A fault of the command line or of the files that it names; another command.
 pub fn files<'a>(arguments: impl IntoIterator<Item = &'a str>) -> Result<BTreeMap<String, String>, Failure> {
+    let arguments: Vec<&str> = arguments.into_iter().collect();
+    made::heed(arguments.iter().map(OsString::from));
     let line = std::iter::once("policyc").chain(arguments);
     let arguments = Arguments::try_parse_from(line).map_err(|error| {
         let text = error.to_string();
@@ -56,9 +59,10 @@ pub fn files<'a>(arguments: impl IntoIterator<Item = &'a str>) -> Result<BTreeMa
         Command::Diagnose(options) => commands::diagnose::files(options),
         Command::Drm(Drm::Fit(options)) => {
             let made = commands::drm::fit::make(options, true)?;
+            let page = commands::drm::fit::signed(options, &made)?;
             let files = [
                 ("drm.toml", Some(made.mapping)),
-                ("report.html", made.page),
+                ("report.html", page),
                 ("report.json", Some(made.json)),
                 ("report.txt", Some(made.text)),
             ];

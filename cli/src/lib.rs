@@ -7,6 +7,7 @@ mod campaign;
 mod commands;
 mod failure;
 mod interruption;
+mod made;
 mod one_of;
 mod outcome;
 mod output;
@@ -34,6 +35,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     {
         return campaign::work() as u8;
     }
+    made::heed(arguments.iter().skip(1).cloned());
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {

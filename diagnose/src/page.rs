@@ -2,17 +2,20 @@
 
 mod captures;
 mod colours;
+pub mod comparison;
 mod control;
 mod empirical;
 mod records;
+mod spectrum;
 
 use report::{Axis, BarChart, BarPanel, Chart, Page, Panel, ReportError, Section, Series, Table, quantity};
 
 use self::colours::{EXTENDED, MODEL};
 use crate::diagnosis::Diagnosis;
 use crate::findings::{Named, Verdict};
-use crate::gain::Regime;
-use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
+use crate::gain::{Pair, Regime, Shift};
+use crate::noise::channel;
+use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS};
 use crate::timing;
 use crate::words::{needs, si, told, unit};
 
@@ -22,24 +25,27 @@ use crate::words::{needs, si, told, unit};
 /// None in practice: a table whose rows do not fit its columns. A picture that cannot be drawn says so in its place.
 pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     let findings = &diagnosis.findings;
-    let mark = match findings.verdict {
-        Verdict::Consistent | Verdict::Explained => report::Verdict::Pass,
-        Verdict::Ambiguous | Verdict::MostlyExplained => report::Verdict::Warn,
-        Verdict::Unexplained => report::Verdict::Fail,
-    };
-    let word = findings.headline();
+    let list = comparison::compared(diagnosis);
+    let mut page = Page::new(title(findings.verdict));
     // what leaves out a channel is no answer to rely on, whatever it says
-    let mark = match (mark, findings.compared.leaves_out()) {
-        (report::Verdict::Pass, true) => report::Verdict::Warn,
+    let mark = match (mark(findings.verdict), findings.compared.leaves_out()) {
+        (report::Verdict::Pass | report::Verdict::Note, true) => report::Verdict::Warn,
         (mark, _) => mark,
     };
-    let mut page = Page::new(format!("Diagnosis: {word}")).verdict(mark, findings.sentence.clone());
-    page = page.section(causes(diagnosis));
-    if let Some(term) = &diagnosis.empirical {
-        page = page.section(empirical::section(term));
+    page = page.verdict_as(
+        mark,
+        word(findings.verdict),
+        headline(diagnosis, &list),
+    );
+    if !list.is_empty() {
+        page = page.section(comparison::section(&list));
     }
     if let Some(section) = held_out(diagnosis) {
         page = page.section(section);
+    }
+    page = page.section(causes(diagnosis));
+    if let Some(term) = &diagnosis.empirical {
+        page = page.section(empirical::section(term));
     }
     if let Some(reason) = &diagnosis.findings.gain.closed_loop_missing {
         page = page.section(control::missing(reason));
@@ -61,6 +67,45 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
         page = page.section(ties(diagnosis));
     }
     page.section(noise(diagnosis)).section(detectable(diagnosis)).html()
+}
+
+/// A colour says how sure the answer is; green alone is a model that is right.
+fn mark(verdict: Verdict) -> report::Verdict {
+    match verdict {
+        Verdict::Consistent => report::Verdict::Pass,
+        Verdict::Explained => report::Verdict::Note,
+        Verdict::Ambiguous | Verdict::MostlyExplained => report::Verdict::Warn,
+        Verdict::Unexplained => report::Verdict::Fail,
+    }
+}
+
+fn word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Consistent => "model holds",
+        Verdict::Explained => "explained",
+        Verdict::Ambiguous => "ambiguous",
+        Verdict::MostlyExplained => "mostly explained",
+        Verdict::Unexplained => "unexplained",
+    }
+}
+
+fn title(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Consistent => "Diagnosis: the model agrees with the records",
+        Verdict::Explained => "Diagnosis: the model is off, and why is known",
+        Verdict::Ambiguous => "Diagnosis: the model is off, and more than one reason fits",
+        Verdict::MostlyExplained => "Diagnosis: the model is off, and most of it is explained",
+        Verdict::Unexplained => "Diagnosis: the model is off, and no known cause explains it",
+    }
+}
+
+/// The volts before and after, then the causes.
+fn headline(diagnosis: &Diagnosis, list: &[comparison::Compared]) -> String {
+    let sentence = &diagnosis.findings.sentence;
+    match comparison::volts(list) {
+        Some(volts) => format!("{volts} {sentence}"),
+        None => sentence.clone(),
+    }
 }
 
 fn causes(diagnosis: &Diagnosis) -> Section {
@@ -111,10 +156,8 @@ fn causes(diagnosis: &Diagnosis) -> Section {
     if !findings.partial.is_empty() {
         section = section.text("The best of the known causes leave structure and are not named as causes:");
         section = section.table(table("Partial explanation", &findings.partial));
-        section = section.text("What it would gain, root mean square; none of it is an explanation:");
-        for worth in &findings.partial_gain {
-            section = section.text(worth.words());
-        }
+        section =
+            section.text("What they would gain stands in the first table, under after. None of it is an explanation.");
     }
     if let Some(aside) = &findings.set_aside {
         section = section.text(format!(
@@ -147,10 +190,13 @@ fn profiles(diagnosis: &Diagnosis) -> Section {
         let id = diagnosis.attribution.id(cause);
         let panel = Panel::new(Axis::new("cost in chi-square")).height(90.0);
         let panel = panel
-            .series(Series::line("profile", x.clone(), y.clone()))
-            .series(Series::points("fitted", x, y));
+            .series(Series::line("cost", x.clone(), y.clone()))
+            .series(Series::points("", x, y));
         let chart = Chart::new(
-            format!("{id}: {}", profile.name),
+            match id == profile.name {
+                true => format!("Cost of holding {id}"),
+                false => format!("Cost of holding {} of {id}", profile.name),
+            },
             Axis::new(profile.name).unit(unit(profile.unit)),
         );
         // the level at which `profile` ends its intervals
@@ -209,8 +255,7 @@ fn held_out(diagnosis: &Diagnosis) -> Option<Section> {
     let ratio = |f: fn(&crate::gain::Held) -> f64| whole.iter().map(|held| f(held) / held.floor).collect::<Vec<_>>();
     let mut panel = BarPanel::new(Axis::new("error over noise"));
     panel = panel.bars_in(MODEL, "model", ratio(|held| held.rmse_before));
-    let is_described = diagnosis.findings.empirical.as_ref().is_some_and(|term| term.written);
-    let second = empirical::second(!diagnosis.findings.causes.is_empty(), is_described);
+    let second = comparison::second_held(diagnosis);
     let is_extended = second.is_some();
     if let Some(name) = second {
         panel = panel.bars_in(EXTENDED, name, ratio(|held| held.rmse_after));
@@ -255,11 +300,36 @@ fn held_out(diagnosis: &Diagnosis) -> Option<Section> {
         table = table.row(row);
     }
     section = section.details(Section::new("By record and regime").table(table));
-    let mut inner = Section::new("Pictures of the held-out records");
-    for record in 0..pair.problem.records.len() {
-        inner = records::pictures(inner, &pair.problem, [&pair.before, &pair.after], record, second, "");
+    Some(held_pictures(section, diagnosis, pair))
+}
+
+/// The held-out record that the model as given misses most, and the others behind a click.
+fn held_pictures(section: Section, diagnosis: &Diagnosis, pair: &Pair) -> Section {
+    let second = comparison::second_held(diagnosis);
+    let square = |record: usize| {
+        let own = (0..CHANNELS).flat_map(|n| channel(&pair.problem, &pair.before.residual, record, n));
+        own.map(|v| v * v).sum::<f64>() / pair.problem.records[record].rows().max(1) as f64
+    };
+    let also = |record: usize| {
+        let own = |shift: &&Shift| shift.record == pair.problem.records[record].name;
+        let shifts = diagnosis.findings.gain.shifts.iter().filter(own);
+        let place = |shift: &Shift| CHANNEL_NAMES.iter().position(|name| *name == shift.channel);
+        shifts.filter_map(place).collect::<Vec<_>>()
+    };
+    let count = pair.problem.records.len();
+    let worst = (0..count).max_by(|a, b| square(*a).total_cmp(&square(*b))).unwrap_or(0);
+    let draw = |section: Section, record: usize, caption: &str| {
+        let states = [&pair.before, &pair.after];
+        records::pictures(section, &pair.problem, states, record, second, &also(record), caption)
+    };
+    let caption = "The held-out record that the model as given misses most. No fit has seen it; its initial state is estimated for each model.";
+    let section = draw(section, worst, caption);
+    if count < 2 {
+        return section;
     }
-    Some(section.details(inner))
+    let others = (0..count).filter(|record| *record != worst);
+    let inner = Section::new("The other held-out records");
+    section.details(others.fold(inner, |inner, record| draw(inner, record, "")))
 }
 
 fn noise(diagnosis: &Diagnosis) -> Section {
@@ -271,10 +341,13 @@ fn noise(diagnosis: &Diagnosis) -> Section {
         }
     }
     pairs.push((
-        "scatter over independent noise".to_owned(),
+        "scatter of sums of errors over that of white noise".to_owned(),
         format!("{:.2}", noise.inflation),
     ));
-    pairs.push(("duty added by the edges".to_owned(), format!("{:.1e}", noise.trim)));
+    pairs.push((
+        "duty that the edges of the gate add".to_owned(),
+        quantity(noise.trim, "", 2),
+    ));
     let mut section = Section::new("Noise and data").pairs(pairs);
     for text in &noise.repairs {
         section = section.text(text.clone());

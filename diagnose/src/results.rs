@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use measured::ColumnMap;
+use report::CommandLine;
+use serde::Serialize;
 use toml_input::{Faults, Message};
 
 use crate::capture::estimates::Estimates;
@@ -11,19 +13,103 @@ use crate::diagnosis::Diagnosis;
 use crate::extend::{extended_toml, partial_toml};
 use crate::findings::Findings;
 use crate::gain::Regime;
+use crate::page::comparison::{Compared, compared};
 use crate::page::page;
+
+/// `diagnosis.json`.
+#[derive(Serialize)]
+struct Written<'a> {
+    #[serde(flatten)]
+    findings: &'a Findings,
+    fits: Vec<Compared>,
+}
+
+/// What was asked of a diagnosis, for its page; paths as the user gave them.
+#[derive(Debug, Clone, Default)]
+pub struct Asked {
+    /// The plant's file.
+    pub model: String,
+    /// Records that are fitted.
+    pub train: Vec<String>,
+    /// Records that judge.
+    pub heldout: Vec<String>,
+    /// Column maps of the command line.
+    pub map: Vec<String>,
+    /// Other options by name and value; those without a value have an empty one.
+    pub others: Vec<(&'static str, String)>,
+}
+
+impl Asked {
+    fn command(&self) -> CommandLine {
+        let command = CommandLine::new("policyc diagnose")
+            .option("--model", &self.model)
+            .options("--train", &self.train)
+            .options("--heldout", &self.heldout);
+        let command = self
+            .map
+            .iter()
+            .fold(command, |command, map| command.option("--map", map));
+        let others = self
+            .others
+            .iter()
+            .fold(command, |command, (name, value)| match value.is_empty() {
+                true => command.flag(name, true),
+                false => command.option(name, value),
+            });
+        others.option("--out", "diagnosis")
+    }
+
+    fn read(&self) -> Vec<(&'static str, String)> {
+        let mut read = vec![
+            ("model", self.model.clone()),
+            ("training records", self.train.join(", ")),
+        ];
+        if !self.heldout.is_empty() {
+            read.push(("held-out records", self.heldout.join(", ")));
+        }
+        let files = self
+            .others
+            .iter()
+            .filter(|(name, _)| *name == "--columns")
+            .map(|(_, file)| file.clone());
+        let maps: Vec<String> = files.chain(self.map.iter().cloned()).collect();
+        if !maps.is_empty() {
+            read.push(("column map", maps.join(", ")));
+        }
+        read
+    }
+}
+
+/// [`files`], whose page says what was asked.
+///
+/// # Errors
+/// If a page cannot be drawn.
+pub fn files_of(diagnosis: &Diagnosis, asked: &Asked) -> Result<BTreeMap<String, String>, Faults> {
+    let mut files = files(diagnosis)?;
+    if let Some(page) = files.get_mut(PAGE) {
+        *page = report::made(page, &asked.command(), asked.read()).map_err(told)?;
+    }
+    Ok(files)
+}
+
+/// Name of the page among the files.
+const PAGE: &str = "report.html";
 
 /// Name and text of every file of a diagnosis.
 ///
 /// # Errors
 /// If a page cannot be drawn.
 pub fn files(diagnosis: &Diagnosis) -> Result<BTreeMap<String, String>, Faults> {
-    let mut json = serde_json::to_string_pretty(&diagnosis.findings).map_err(told)?;
+    let written = Written {
+        findings: &diagnosis.findings,
+        fits: compared(diagnosis),
+    };
+    let mut json = serde_json::to_string_pretty(&written).map_err(told)?;
     json.push('\n');
     let mut files = BTreeMap::from([
         ("diagnosis.json".to_owned(), json),
         ("plant.extended.toml".to_owned(), extended_toml(diagnosis)),
-        ("report.html".to_owned(), page(diagnosis).map_err(told)?),
+        (PAGE.to_owned(), page(diagnosis).map_err(told)?),
     ]);
     if let Some(partial) = partial_toml(diagnosis) {
         files.insert("plant.partial.toml".to_owned(), partial);

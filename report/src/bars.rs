@@ -1,12 +1,13 @@
 //! Bars and dots by category.
 
+use crate::alt;
 use crate::axis::{Axis, Settled};
 use crate::colour::Colour;
 use crate::error::ReportError;
 use crate::font::{LEADING, SMALL, width, wrap};
 use crate::frame::{
-    Area, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, below, border, dot, grid, rectangle, sheet,
-    widest,
+    Area, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, below, border, dot, grid, height_on, rectangle,
+    sheet, widest,
 };
 use crate::markup::{Markup, Px};
 use crate::series::Kind;
@@ -37,7 +38,7 @@ pub struct BarChart {
 #[derive(Debug, Clone)]
 pub struct BarPanel {
     axis: Axis,
-    series: Vec<(String, Vec<f64>, Option<Colour>)>,
+    pub(crate) series: Vec<(String, Vec<f64>, Option<Colour>)>,
 }
 
 impl BarPanel {
@@ -133,7 +134,14 @@ impl BarChart {
                 return Err(ReportError::Lengths { what, expected, found });
             }
         }
-        if self.vertical { self.columns() } else { self.rows() }
+        Svg::new(|sheet| match self.vertical {
+            true => self.columns(sheet),
+            false => self.rows(sheet),
+        })
+    }
+
+    fn alt(&self, axes: &[Settled]) -> String {
+        alt::bars(&self.title, axes, &self.panels, &self.categories)
     }
 
     fn entries(&self) -> Vec<Entry> {
@@ -161,41 +169,44 @@ impl BarChart {
         if self.dots { 1 } else { most.unwrap_or(1).max(1) }
     }
 
-    fn rows(&self) -> Result<Svg, ReportError> {
-        let number = self.panels.len() as f64;
-        let names = self
-            .categories
-            .iter()
-            .map(|name| width(name, SMALL))
-            .fold(0.0, f64::max);
+    /// Panels beside each other, or below each other where the sheet is narrow.
+    fn rows(&self, sheet_width: f64) -> Result<String, ReportError> {
+        let beside = if sheet_width < WIDTH { 1 } else { self.panels.len() };
         // long names take at most this much; the bars are what the chart is for
-        let left = EDGE + names.min(WIDTH * 0.45) + 8.0;
-        let wide = ((WIDTH - left - EDGE - 12.0 - (number - 1.0) * GAP) / number).max(40.0);
+        let room = sheet_width * 0.45;
+        let names: Vec<Vec<String>> = self.categories.iter().map(|name| wrap(name, SMALL, room)).collect();
+        let widest = names
+            .iter()
+            .flatten()
+            .map(|line| width(line, SMALL))
+            .fold(0.0, f64::max);
+        let left = EDGE + widest.min(room) + 8.0;
+        let wide = ((sheet_width - left - EDGE - 12.0 - (beside as f64 - 1.0) * GAP) / beside as f64).max(40.0);
         // a tick for every 75 pixels: the widest usual label has room
         let axes = self.panels.iter().map(|panel| panel.settle((wide / 75.0) as usize));
         let axes = axes.collect::<Result<Vec<_>, _>>()?;
         let entries = self.entries();
-        let head = Head::new(&self.title, legend(&entries), WIDTH);
-        let row = ROW.max(self.lanes() as f64 * ROW_OF_GROUP + 6.0);
+        let head = Head::new(&self.title, legend(&entries), sheet_width);
+        let lines = names.iter().map(Vec::len).max().unwrap_or(1) as f64;
+        let row = ROW
+            .max(self.lanes() as f64 * ROW_OF_GROUP + 6.0)
+            .max(lines * SMALL * LEADING + 4.0);
         let top = head.height() + 8.0;
         let high = row * self.categories.len() as f64;
-        let mut out = sheet(&self.title, WIDTH, top + high + TICK_ROOM + LINE + EDGE);
+        let pitch = high + TICK_ROOM + LINE + EDGE;
+        let below_each_other = self.panels.len().div_ceil(beside);
+        let mut out = sheet(&self.alt(&axes), sheet_width, top + pitch * below_each_other as f64);
         head.draw(&mut out);
-        for (n, name) in self.categories.iter().enumerate() {
-            let y = top + row * (n as f64 + 0.5) + 4.0;
-            out.text(
-                "text",
-                &[("x", &Px(left - 8.0)), ("y", &Px(y)), ("text-anchor", &"end")],
-                name,
-            );
-        }
         for (n, (panel, axis)) in self.panels.iter().zip(&axes).enumerate() {
             let area = Area {
-                x: left + n as f64 * (wide + GAP),
-                y: top,
+                x: left + (n % beside) as f64 * (wide + GAP),
+                y: top + pitch * (n / beside) as f64,
                 width: wide,
                 height: high,
             };
+            if n % beside == 0 {
+                category_names(&mut out, &names, area, row);
+            }
             let scale = axis.onto(area.x, area.right());
             grid(&mut out, area, Some((scale, true)), None);
             self.draw(&mut out, panel, axis, area, &entries);
@@ -203,20 +214,20 @@ impl BarChart {
             below(&mut out, area, &axis.label);
         }
         out.close("svg");
-        Ok(Svg::new(out.finish()))
+        Ok(out.finish())
     }
 
-    fn columns(&self) -> Result<Svg, ReportError> {
-        let panel_height = 200.0;
+    fn columns(&self, sheet_width: f64) -> Result<String, ReportError> {
+        let panel_height = height_on(sheet_width, 200.0);
         let axes = self
             .panels
             .iter()
             .map(|panel| panel.settle(5))
             .collect::<Result<Vec<_>, _>>()?;
         let entries = self.entries();
-        let head = Head::new(&self.title, legend(&entries), WIDTH);
+        let head = Head::new(&self.title, legend(&entries), sheet_width);
         let left = EDGE + axes.iter().map(widest).fold(24.0, f64::max) + 6.0;
-        let wide = WIDTH - left - EDGE;
+        let wide = sheet_width - left - EDGE;
         let column = wide / self.categories.len() as f64;
         let names: Vec<_> = self
             .categories
@@ -227,7 +238,7 @@ impl BarChart {
         let pitch = PANEL_TITLE + panel_height + 8.0;
         let top = head.height();
         let bottom = top + pitch * self.panels.len() as f64;
-        let mut out = sheet(&self.title, WIDTH, bottom + lines * LINE + EDGE);
+        let mut out = sheet(&self.alt(&axes), sheet_width, bottom + lines * LINE + EDGE);
         head.draw(&mut out);
         for (n, (panel, axis)) in self.panels.iter().zip(&axes).enumerate() {
             let y = top + n as f64 * pitch + PANEL_TITLE;
@@ -254,7 +265,7 @@ impl BarChart {
             }
         }
         out.close("svg");
-        Ok(Svg::new(out.finish()))
+        Ok(out.finish())
     }
 
     fn draw(&self, out: &mut Markup, panel: &BarPanel, axis: &Settled, area: Area, entries: &[Entry]) {
@@ -336,6 +347,21 @@ impl BarChart {
             }
         };
         rectangle(out, bar, colour, 1.0);
+    }
+}
+
+/// To the left of a panel, each in the middle of its row.
+fn category_names(out: &mut Markup, names: &[Vec<String>], area: Area, row: f64) {
+    for (n, lines) in names.iter().enumerate() {
+        let first = area.y + row * (n as f64 + 0.5) + 4.0 - (lines.len() as f64 - 1.0) * SMALL * LEADING / 2.0;
+        for (line, text) in lines.iter().enumerate() {
+            let y = first + line as f64 * SMALL * LEADING;
+            out.text(
+                "text",
+                &[("x", &Px(area.x - 8.0)), ("y", &Px(y)), ("text-anchor", &"end")],
+                text,
+            );
+        }
     }
 }
 

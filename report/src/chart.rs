@@ -1,14 +1,16 @@
 //! Panels with a shared x axis.
 
+use crate::alt;
 use crate::axis::{Axis, Scale, Settled};
 use crate::colour::Colour;
 use crate::error::ReportError;
 use crate::font::{SMALL, width};
 use crate::frame::{
     Area, BAND_OPACITY, DASH, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, below, border, grid,
-    rectangle, sheet, widest,
+    height_on, sheet, widest,
 };
 use crate::live;
+use crate::marks::{label, zone};
 use crate::markup::{Markup, Px};
 use crate::path;
 use crate::series::{Kind, Mark, Series};
@@ -36,7 +38,7 @@ pub struct Chart {
 pub struct Panel {
     y: Axis,
     height: f64,
-    series: Vec<Series>,
+    pub(crate) series: Vec<Series>,
     marks: Vec<Mark>,
 }
 
@@ -131,47 +133,9 @@ impl Chart {
         for series in self.panels.iter().flat_map(|panel| &panel.series) {
             series.check()?;
         }
-        let all_x = self.panels.iter().flat_map(|panel| {
-            let series = panel.series.iter().flat_map(|series| series.x.iter().copied());
-            series.chain(panel.ends(true))
-        });
-        let series = || self.panels.iter().flat_map(|panel| &panel.series);
-        // a marker at the edge would be cut in half
-        let free = if series().any(|series| series.kind == Kind::Points) {
-            0.02
-        } else {
-            0.0
-        };
-        let x = self.x.settle(all_x, [free; 2], 9)?;
         let ys = self.panels.iter().map(y_axis).collect::<Result<Vec<_>, _>>()?;
-
         let colours = Colours::new(&self.panels);
-        let head = Head::new(&self.title, colours.entries.clone(), WIDTH);
-        let left = EDGE + ys.iter().map(widest).fold(24.0, f64::max) + 6.0;
-        let last_label = x
-            .ticks
-            .iter()
-            .rev()
-            .find_map(|tick| tick.label.as_deref())
-            .unwrap_or("");
-        // half of the last label stands beyond the end of the axis
-        let right = EDGE + (width(last_label, SMALL) / 2.0).max(4.0);
-        let mut areas = Vec::new();
-        let mut top = head.height();
-        for panel in &self.panels {
-            let y = top + PANEL_TITLE;
-            areas.push(Area {
-                x: left,
-                y,
-                width: WIDTH - left - right,
-                height: panel.height,
-            });
-            top = y + panel.height + 8.0;
-        }
-        let high = top + TICK_ROOM + LINE + EDGE - 8.0;
-
-        let mut out = sheet(&self.title, WIDTH, high);
-        head.draw(&mut out);
+        let mut svg = Svg::new(|sheet| self.drawn(sheet, &ys, &colours))?;
         let panels: Vec<live::Drawn> = (self.panels.iter().zip(&ys))
             .map(|(panel, y)| live::Drawn {
                 y,
@@ -180,21 +144,62 @@ impl Chart {
                 marks: &panel.marks,
             })
             .collect();
+        svg.live = live::data(&self.title, &self.x_axis(WIDTH)?, &panels);
+        Ok(svg)
+    }
+
+    fn x_axis(&self, sheet: f64) -> Result<Settled, ReportError> {
+        let all_x = self.panels.iter().flat_map(|panel| {
+            let series = panel.series.iter().flat_map(|series| series.x.iter().copied());
+            series.chain(panel.ends(true))
+        });
+        let mut series = self.panels.iter().flat_map(|panel| &panel.series);
+        // a marker at the edge would be cut in half
+        let free = if series.any(|series| series.kind == Kind::Points) {
+            0.02
+        } else {
+            0.0
+        };
+        // a tick for every 80 to 100 pixels: the widest usual label has room
+        self.x.settle(all_x, [free; 2], if sheet < WIDTH { 4 } else { 9 })
+    }
+
+    fn drawn(&self, wide: f64, ys: &[Settled], colours: &Colours) -> Result<String, ReportError> {
+        let x = self.x_axis(wide)?;
+        let head = Head::new(&self.title, colours.entries.clone(), wide);
+        let left = EDGE + ys.iter().map(widest).fold(24.0, f64::max) + 6.0;
+        let mut labels = x.ticks.iter().rev().filter_map(|tick| tick.label.as_deref());
+        // half of the last label stands beyond the end of the axis
+        let right = EDGE + (width(labels.next().unwrap_or(""), SMALL) / 2.0).max(4.0);
+        let mut areas = Vec::new();
+        let mut top = head.height();
+        for panel in &self.panels {
+            let (y, height) = (top + PANEL_TITLE, height_on(wide, panel.height));
+            areas.push(Area {
+                x: left,
+                y,
+                width: wide - left - right,
+                height,
+            });
+            top = y + height + 8.0;
+        }
+        let high = top + TICK_ROOM + LINE + EDGE - 8.0;
+
+        let mut out = sheet(&alt::chart(&self.title, &x, &self.panels, ys), wide, high);
+        head.draw(&mut out);
         let last = self.panels.len() - 1;
-        for (n, ((panel, y), area)) in self.panels.iter().zip(&ys).zip(areas).enumerate() {
+        for (n, ((panel, y), area)) in self.panels.iter().zip(ys).zip(areas).enumerate() {
             out.text("text", &[("x", &Px(EDGE)), ("y", &Px(area.y - 11.0))], &y.label);
             let (xs, ys) = (x.onto(area.x, area.right()), y.onto(area.bottom(), area.y));
             grid(&mut out, area, Some((xs, n == last)), Some(ys));
-            draw(&mut out, panel, &x, y, area, &colours)?;
+            draw(&mut out, panel, &x, y, area, colours)?;
             border(&mut out, area);
             if n == last {
                 below(&mut out, area, &x.label);
             }
         }
         out.close("svg");
-        let mut svg = Svg::new(out.finish());
-        svg.live = live::data(&self.title, &x, &panels);
-        Ok(svg)
+        Ok(out.finish())
     }
 }
 
@@ -338,99 +343,4 @@ fn trace(
         }
     }
     Ok(())
-}
-
-fn zone(out: &mut Markup, mark: &Mark, xs: Scale, ys: Scale) {
-    let along = if mark.on_x { xs } else { ys };
-    let (Some(a), Some(b)) = (along.at(mark.from), along.at(mark.to)) else {
-        return;
-    };
-    let (start, size) = (a.min(b), (a - b).abs());
-    let (wide, high) = (xs.to, ys.from);
-    if mark.from == mark.to {
-        let d = if mark.on_x {
-            format!("M{},0V{}", Px(a), Px(high))
-        } else {
-            format!("M0,{}H{}", Px(a), Px(wide))
-        };
-        let pen: [(&str, &dyn std::fmt::Display); 3] =
-            [("d", &d), ("stroke", &Colour::DIM), ("stroke-dasharray", &"4 3")];
-        out.leaf("path", &pen);
-        return;
-    }
-    let area = if mark.on_x {
-        Area {
-            x: start,
-            y: 0.0,
-            width: size,
-            height: high,
-        }
-    } else {
-        Area {
-            x: 0.0,
-            y: start,
-            width: wide,
-            height: size,
-        }
-    };
-    rectangle(out, area, Colour::GREY, BAND_OPACITY);
-}
-
-/// Writes the label where no earlier label stands: beside the line, else on its other side, else further along.
-fn label(out: &mut Markup, mark: &Mark, xs: Scale, ys: Scale, taken: &mut Vec<Area>) {
-    let along = if mark.on_x { xs } else { ys };
-    let (Some(a), Some(b)) = (along.at(mark.from), along.at(mark.to)) else {
-        return;
-    };
-    if mark.label.is_empty() {
-        return;
-    }
-    let (wide, high) = (xs.to, ys.from);
-    let size = (width(&mark.label, SMALL), LINE);
-    let box_at = |x: f64, y: f64| Area {
-        x: x.clamp(4.0, (wide - size.0 - 4.0).max(4.0)),
-        y: y.clamp(1.0, (high - size.1).max(1.0)),
-        width: size.0,
-        height: size.1,
-    };
-    let (near, far) = (a.min(b), a.max(b));
-    let places: Vec<Area> = if mark.on_x {
-        // six rows and three columns of places: a convention; with all taken the first is used, since a label is never
-        // dropped
-        let rows = (0..6).map(|row| f64::from(row) * LINE + 2.0);
-        rows.flat_map(|y| [box_at(near + 5.0, y), box_at(far - size.0 - 5.0, y)])
-            .collect()
-    } else {
-        let columns = [wide - size.0 - 6.0, 6.0, (wide - size.0) / 2.0];
-        let heights = if near == far {
-            [near - LINE, near + 2.0]
-        } else {
-            [near + 1.0, far - LINE]
-        };
-        columns.iter().flat_map(|x| heights.map(|y| box_at(*x, y))).collect()
-    };
-    let free = places
-        .iter()
-        .find(|place| !taken.iter().any(|other| overlap(place, other)));
-    let Some(place) = free.or(places.first()).copied() else {
-        return;
-    };
-    taken.push(place);
-    out.text(
-        "text",
-        &[
-            ("x", &Px(place.x)),
-            ("y", &Px(place.y + 12.0)),
-            ("fill", &Colour::DIM),
-            // a seam of paper round the letters keeps them readable on lines and bands
-            ("stroke", &Colour::PAPER),
-            ("stroke-width", &3),
-            ("paint-order", &"stroke"),
-        ],
-        &mark.label,
-    );
-}
-
-fn overlap(a: &Area, b: &Area) -> bool {
-    a.x < b.right() && b.x < a.right() && a.y < b.bottom() && b.y < a.bottom()
 }

@@ -2,6 +2,7 @@
 
 use crate::axis::{Scale, Settled, Tick};
 use crate::colour::Colour;
+use crate::error::ReportError;
 use crate::font::{LARGE, LEADING, SMALL, width, wrap};
 use crate::markup::{Markup, Px};
 use crate::series::Kind;
@@ -10,13 +11,20 @@ use crate::series::Kind;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Svg {
     markup: String,
+    /// The same for a small screen and for a column of print, where letters of the wide one could not be read.
+    pub(crate) narrow: String,
     /// Its data for the script of a page, if there is something that can be asked of it.
     pub(crate) live: Option<String>,
 }
 
 impl Svg {
-    pub(crate) fn new(markup: String) -> Self {
-        Self { markup, live: None }
+    /// What `draw` draws for each of both widths.
+    pub(crate) fn new(draw: impl Fn(f64) -> Result<String, ReportError>) -> Result<Self, ReportError> {
+        Ok(Self {
+            markup: draw(WIDTH)?,
+            narrow: draw(NARROW)?,
+            live: None,
+        })
     }
 
     /// The markup.
@@ -34,6 +42,8 @@ impl std::fmt::Display for Svg {
 /// Width of a chart unless told otherwise, pixels.
 // this and the pixels below are laid out by eye: conventions
 pub const WIDTH: f64 = 900.0;
+/// Width for a screen of 390 pixels with its edges, and for half a sheet of A4.
+pub const NARROW: f64 = 356.0;
 /// Free edge of the sheet.
 pub const EDGE: f64 = 12.0;
 /// Room below a panel for tick labels.
@@ -187,8 +197,18 @@ pub fn rectangle(out: &mut Markup, area: Area, colour: Colour, opacity: f64) {
     out.leaf("rect", if opacity == 1.0 { &place[..5] } else { &place });
 }
 
-/// Opens the sheet: size, font, white background, so that the chart looks the same on a dark page.
-pub fn sheet(title: &str, wide: f64, high: f64) -> Markup {
+/// Height of a drawing area on a sheet of some width: a small screen is low as well as narrow.
+pub fn height_on(sheet: f64, height: f64) -> f64 {
+    match sheet < WIDTH {
+        // two ticks of the axis have room in 90 pixels
+        true => (height * 0.65).max(height.min(90.0)),
+        false => height,
+    }
+}
+
+/// Opens the sheet: size, font, white background, so that the chart looks the same on a dark page. `alt` says in words and numbers
+/// what there is to see.
+pub fn sheet(alt: &str, wide: f64, high: f64) -> Markup {
     let mut out = Markup::default();
     out.open(
         "svg",
@@ -198,7 +218,7 @@ pub fn sheet(title: &str, wide: f64, high: f64) -> Markup {
             ("width", &Px(wide)),
             ("height", &Px(high)),
             ("role", &"img"),
-            ("aria-label", &title),
+            ("aria-label", &alt),
             // names only: no font is embedded or loaded
             ("font-family", &"system-ui, 'Segoe UI', Helvetica, Arial, sans-serif"),
             ("font-size", &SMALL),

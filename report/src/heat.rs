@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use crate::alt;
 use crate::axis::{Axis, Settled, Tick};
 use crate::colour::{Colour, Ramp};
 use crate::error::ReportError;
 use crate::font::{SMALL, width};
 use crate::frame::{
-    Area, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, below, border, grid, rectangle, sheet, widest,
+    Area, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, below, border, grid, height_on, rectangle,
+    sheet, widest,
 };
 use crate::markup::{Markup, Px};
 use crate::path;
@@ -48,6 +50,8 @@ enum Colours {
 
 /// Colour of a cell without value.
 const MISSING: Colour = Colour(0xd0, 0xd3, 0xd8);
+/// Around a dot; not the paper, which a dark page replaces.
+const RIM: Colour = Colour(0xfe, 0xfe, 0xfe);
 /// Steps of a smooth ramp; more cannot be told apart.
 // fewer colours also make fewer paths, each of a whole map
 const STEPS: f64 = 64.0;
@@ -137,23 +141,41 @@ impl HeatMap {
         for (name, x, y) in &self.dots {
             lengths(name, x.len(), y.len())?;
         }
-        let (x, x_edges) = edges(&self.x, &self.columns, 9)?;
+        Svg::new(|sheet| self.drawn(sheet))
+    }
+
+    fn drawn(&self, wide: f64) -> Result<String, ReportError> {
+        let is_narrow = wide < WIDTH;
+        let (x, x_edges) = edges(&self.x, &self.columns, if is_narrow { 4 } else { 9 })?;
         let (y, y_edges) = edges(&self.y, &self.rows, 7)?;
         let value = self.value_axis()?;
-        let head = Head::new(&self.title, self.legend(), WIDTH);
-        let top = head.height() + PANEL_TITLE;
-        let left = EDGE + widest(&y).max(24.0) + 6.0;
+        let head = Head::new(&self.title, self.legend(), wide);
         let categories = matches!(self.colours, Colours::Categories(_));
-        let bar = (BAR + 6.0 + widest(&value)).max(width(&value.label, SMALL));
-        let right = EDGE + if categories { 8.0 } else { BESIDE + bar };
+        // on a narrow sheet the title of the colours has a line of its own
+        let title_room = if is_narrow && !categories { LINE } else { 0.0 };
+        let top = head.height() + title_room + PANEL_TITLE;
+        let left = EDGE + widest(&y).max(24.0) + 6.0;
+        let beside = if is_narrow { BESIDE / 2.0 } else { BESIDE };
+        let bar = BAR + 6.0 + widest(&value);
+        let bar = if is_narrow {
+            bar
+        } else {
+            bar.max(width(&value.label, SMALL))
+        };
+        let right = EDGE + if categories { 8.0 } else { beside + bar };
         // whole pixels, so that cells, frame and grid meet without half-covered edges
         let area = Area {
             x: left.round(),
             y: top.round(),
-            width: (WIDTH - left - right).floor(),
-            height: HEIGHT,
+            width: (wide - left - right).floor(),
+            height: height_on(wide, HEIGHT),
         };
-        let mut out = sheet(&self.title, WIDTH, area.bottom() + TICK_ROOM + LINE + EDGE);
+        let area = Area {
+            height: area.height.floor(),
+            ..area
+        };
+        let alt = alt::map(&self.title, &x, &y, &value, &self.cells);
+        let mut out = sheet(&alt, wide, area.bottom() + TICK_ROOM + LINE + EDGE);
         head.draw(&mut out);
         out.text("text", &[("x", &Px(EDGE)), ("y", &Px(area.y - 11.0))], &y.label);
         let (xs, ys) = (x.onto(area.x, area.right()), y.onto(area.bottom(), area.y));
@@ -167,7 +189,7 @@ impl HeatMap {
             });
             let data = path::dots(&points.collect::<Vec<_>>());
             // dark on a light rim is seen on every colour of the map
-            for (colour, size) in [(Colour::PAPER, 7.0), (Colour::INK, 4.0)] {
+            for (colour, size) in [(RIM, 7.0), (Colour::INK, 4.0)] {
                 out.leaf(
                     "path",
                     &[
@@ -182,10 +204,21 @@ impl HeatMap {
         border(&mut out, area);
         below(&mut out, area, &x.label);
         if !categories {
-            self.bar(&mut out, &value, area);
+            let bar = Area {
+                x: area.right() + beside,
+                width: BAR,
+                ..area
+            };
+            let title = match is_narrow {
+                true => (EDGE, format!("colour: {}", value.label)),
+                false => (bar.x, value.label.clone()),
+            };
+            let above = area.y - 11.0 - title_room;
+            out.text("text", &[("x", &Px(title.0)), ("y", &Px(above))], &title.1);
+            self.bar(&mut out, &value, bar);
         }
         out.close("svg");
-        Ok(Svg::new(out.finish()))
+        Ok(out.finish())
     }
 
     fn value_axis(&self) -> Result<Settled, ReportError> {
@@ -271,14 +304,8 @@ impl HeatMap {
         out.close("g");
     }
 
-    /// Colour bar to the right.
-    fn bar(&self, out: &mut Markup, value: &Settled, area: Area) {
-        let bar = Area {
-            x: area.right() + BESIDE,
-            width: BAR,
-            ..area
-        };
-        out.text("text", &[("x", &Px(bar.x)), ("y", &Px(bar.y - 11.0))], &value.label);
+    /// Colour bar with its numbers.
+    fn bar(&self, out: &mut Markup, value: &Settled, bar: Area) {
         out.open("g", &[("shape-rendering", &"crispEdges")]);
         let piece = |out: &mut Markup, low: f64, high: f64, colour| {
             let (y, end) = (

@@ -11,15 +11,18 @@
 //! Pictures bring their own white background and an Okabe-Ito palette, so they can be read on a dark page and with any
 //! colour vision.
 
+mod alt;
 mod axis;
 mod bars;
 mod chart;
 mod colour;
+mod command;
 mod error;
 mod font;
 mod frame;
 mod heat;
 mod live;
+mod marks;
 mod markup;
 mod number;
 mod page;
@@ -31,6 +34,7 @@ pub use axis::Axis;
 pub use bars::{BarChart, BarPanel};
 pub use chart::{Chart, Panel};
 pub use colour::{Colour, Ramp};
+pub use command::{CommandLine, made};
 pub use error::ReportError;
 pub use frame::Svg;
 pub use heat::HeatMap;

@@ -1,9 +1,10 @@
 //! HTML pages: one file, nothing loaded, no script but that of the charts.
 
+use crate::command;
 use crate::error::ReportError;
 use crate::frame::Svg;
 use crate::live;
-use crate::markup::Markup;
+use crate::markup::{Attributes, Markup};
 use crate::table::Table;
 
 /// How the verdict of a page came out; it is written as a word, not by colour alone.
@@ -43,7 +44,7 @@ impl Verdict {
 #[derive(Debug, Clone)]
 pub struct Page {
     title: String,
-    verdict: Option<(Verdict, String)>,
+    verdict: Option<(Verdict, &'static str, String)>,
     sections: Vec<Section>,
 }
 
@@ -62,6 +63,7 @@ enum Block {
     Pairs(Vec<(String, String)>),
     Code(String),
     Details(Section),
+    Pick(String, Vec<Section>),
 }
 
 impl Page {
@@ -76,8 +78,16 @@ impl Page {
 
     /// The answer in one sentence, at the top.
     #[must_use]
-    pub fn verdict(mut self, verdict: Verdict, sentence: impl Into<String>) -> Self {
-        self.verdict = Some((verdict, sentence.into()));
+    pub fn verdict(self, verdict: Verdict, sentence: impl Into<String>) -> Self {
+        // a note judges nothing: its sentence stands alone
+        let word = if verdict == Verdict::Note { "" } else { verdict.class() };
+        self.verdict_as(verdict, word, sentence)
+    }
+
+    /// As [`verdict`](Page::verdict) with a word of its own; none if it is empty.
+    #[must_use]
+    pub fn verdict_as(mut self, verdict: Verdict, word: &'static str, sentence: impl Into<String>) -> Self {
+        self.verdict = Some((verdict, word, sentence.into()));
         self
     }
 
@@ -125,24 +135,20 @@ impl Page {
         out.open("body", &[]);
         out.open("main", &[]);
         out.text("h1", &[], &self.title);
-        if let Some((verdict, sentence)) = &self.verdict {
+        if let Some((verdict, word, sentence)) = &self.verdict {
             let class = verdict.class();
             out.open("p", &[("class", &format_args!("verdict {class}"))]);
-            // a note judges nothing: its sentence stands alone
-            if *verdict != Verdict::Note {
-                out.text("strong", &[], class);
+            if !word.is_empty() {
+                out.text("strong", &[], word);
             }
             out.text("span", &[], sentence);
             out.close("p");
         }
+        let mut picks = 0;
         for section in &self.sections {
-            out.open("section", &[]);
-            if !section.heading.is_empty() {
-                out.text("h2", &[], &section.heading);
-            }
-            section.write(&mut out)?;
-            out.close("section");
+            section.whole(&mut out, &[], &mut picks)?;
         }
+        out.raw(command::SECTION);
         out.close("main");
         if let Some(script) = script {
             // its digest stands in the policy, so not a byte beside it
@@ -213,11 +219,19 @@ impl Section {
         self.block(Block::Details(inner))
     }
 
+    /// Sections of which one is shown at a time, picked by its heading; `what` says what is picked. In print all of them stand. One
+    /// alone needs no choice, and has its heading.
+    #[must_use]
+    pub fn pick(self, what: impl Into<String>, sections: Vec<Section>) -> Self {
+        self.block(Block::Pick(what.into(), sections))
+    }
+
     /// Whether a chart in it has data for the script.
     fn is_live(&self) -> bool {
         self.blocks.iter().any(|block| match block {
             Block::Chart(svg, _) => svg.live.is_some(),
             Block::Details(inner) => inner.is_live(),
+            Block::Pick(_, sections) => sections.iter().any(Section::is_live),
             Block::Text(_) | Block::Table(_) | Block::Pairs(_) | Block::Code(_) => false,
         })
     }
@@ -227,24 +241,38 @@ impl Section {
         self
     }
 
-    fn write(&self, out: &mut Markup) -> Result<(), ReportError> {
+    pub(crate) fn whole(&self, out: &mut Markup, attributes: Attributes, picks: &mut usize) -> Result<(), ReportError> {
+        out.open("section", attributes);
+        if !self.heading.is_empty() {
+            out.text("h2", &[], &self.heading);
+        }
+        self.write(out, picks)?;
+        out.close("section");
+        Ok(())
+    }
+
+    fn write(&self, out: &mut Markup, picks: &mut usize) -> Result<(), ReportError> {
         for block in &self.blocks {
             match block {
                 Block::Text(text) => out.text("p", &[], text),
                 Block::Chart(svg, caption) => {
                     out.open("figure", if svg.live.is_some() { &[("class", &"data")] } else { &[] });
-                    // it may be wider than the screen, and is then scrolled by keys as well
-                    out.open("div", &[("class", &"still"), ("tabindex", &0)]);
-                    out.raw(svg.as_str());
-                    out.close("div");
+                    // the style shows one of both, as there is room; beside a live chart one is for print alone, and narrow
+                    let both = [("still wide", svg.as_str()), ("still narrow", svg.narrow.as_str())];
+                    for (class, picture) in both.into_iter().skip(usize::from(svg.live.is_some())) {
+                        out.open("div", &[("class", &class)]);
+                        out.raw(picture);
+                        out.close("div");
+                    }
                     if let Some(data) = &svg.live {
                         out.raw("<script type=\"application/json\">");
                         out.raw(data);
                         out.raw("</script>\n");
                     }
-                    if !caption.is_empty() {
-                        out.text("figcaption", &[], caption);
-                    }
+                    out.open("figcaption", &[]);
+                    out.text("span", &[], caption);
+                    out.raw(command::LINK);
+                    out.close("figcaption");
                     out.close("figure");
                 }
                 Block::Table(table) => table.write(out)?,
@@ -261,11 +289,41 @@ impl Section {
                 Block::Details(inner) => {
                     out.open("details", &[]);
                     out.text("summary", &[], &inner.heading);
-                    inner.write(out)?;
+                    inner.write(out, picks)?;
                     out.close("details");
                 }
+                Block::Pick(what, sections) => pick(out, what, sections, picks)?,
             }
         }
         Ok(())
     }
+}
+
+/// A button for each section, in front of it: so the style alone can tell which one is shown, and no script is needed.
+fn pick(out: &mut Markup, what: &str, sections: &[Section], picks: &mut usize) -> Result<(), ReportError> {
+    if let [only] = sections {
+        return only.whole(out, &[], picks);
+    }
+    // each choice has a name of its own
+    let number = *picks;
+    *picks += 1;
+    out.open("div", &[("class", &"pick"), ("role", &"group"), ("aria-label", &what)]);
+    for (n, section) in sections.iter().enumerate() {
+        let id = format!("pick-{number}-{n}");
+        let name = format!("pick-{number}");
+        let mut attributes: Vec<(&str, &dyn std::fmt::Display)> = vec![
+            ("type", &"radio"),
+            ("id", &id),
+            ("name", &name),
+            ("autocomplete", &"off"),
+        ];
+        if n == 0 {
+            attributes.push(("checked", &"checked"));
+        }
+        out.leaf("input", &attributes);
+        out.text("label", &[("for", &id)], &section.heading);
+        section.whole(out, &[], picks)?;
+    }
+    out.close("div");
+    Ok(())
 }

@@ -77,7 +77,10 @@ impl Table {
             let (what, found) = (self.caption.clone(), row.len());
             return Err(ReportError::Lengths { what, expected, found });
         }
-        out.open("div", &[("class", &"table"), ("tabindex", &0)]);
+        // on a small screen a row of many cells stands as a list of headings and values
+        let is_wide = expected > NARROW;
+        let class = if is_wide { "table many" } else { "table" };
+        out.open("div", &[("class", &class), ("tabindex", &0)]);
         out.open("table", &[]);
         if !self.caption.is_empty() {
             out.text("caption", &[], &self.caption);
@@ -85,22 +88,30 @@ impl Table {
         out.open("thead", &[]);
         out.open("tr", &[]);
         for (heading, decimals) in &self.columns {
-            cell(out, "th", decimals.is_some(), heading);
+            cell(out, "th", decimals.is_some(), None, heading);
         }
         out.close("tr");
         out.close("thead");
         out.open("tbody", &[]);
         for row in &self.rows {
             out.open("tr", &[]);
-            for (content, (_, decimals)) in row.iter().zip(&self.columns) {
+            for (content, (heading, decimals)) in row.iter().zip(&self.columns) {
                 let text = match content {
+                    // an empty cell looks forgotten
+                    Cell::Text(text) if text.is_empty() => "–".to_owned(),
                     Cell::Text(text) => text.clone(),
                     Cell::Number(value) if value.is_nan() => "–".to_owned(),
                     // `fixed` for its true minus sign
                     Cell::Number(value) if value.is_infinite() => fixed(*value, 0).replace("inf", "∞"),
                     Cell::Number(value) => fixed(*value, decimals.unwrap_or(6)),
                 };
-                cell(out, "td", decimals.is_some(), &text);
+                cell(
+                    out,
+                    "td",
+                    decimals.is_some(),
+                    is_wide.then_some(heading.as_str()),
+                    &text,
+                );
             }
             out.close("tr");
         }
@@ -111,10 +122,16 @@ impl Table {
     }
 }
 
-fn cell(out: &mut Markup, name: &str, number: bool, text: &str) {
+/// Columns that stand beside each other on any screen.
+const NARROW: usize = 3;
+
+fn cell(out: &mut Markup, name: &str, number: bool, heading: Option<&str>, text: &str) {
+    let mut attributes: Vec<(&str, &dyn std::fmt::Display)> = Vec::new();
     if number {
-        out.text(name, &[("class", &"n")], text);
-    } else {
-        out.text(name, &[], text);
+        attributes.push(("class", &"n"));
     }
+    if let Some(heading) = &heading {
+        attributes.push(("data-of", heading));
+    }
+    out.text(name, &attributes, text);
 }

@@ -209,6 +209,64 @@ fn a_picture_that_cannot_be_drawn_leaves_its_reason_and_the_rest_of_the_page() {
 }
 
 #[test]
+fn a_page_says_its_command_and_every_picture_leads_there() {
+    let command = report::CommandLine::new("policyc simulate")
+        .argument("a <b>.toml")
+        .options("--with", ["it's"]);
+    let html = report::made(&page("a").html().unwrap(), &command, [("plant", "p.toml")]).unwrap();
+    let typed = "policyc simulate &#39;a &lt;b&gt;.toml&#39; --with &#39;it&#39;\\&#39;&#39;s&#39;</pre>";
+    assert!(html.contains(typed), "{html}");
+    assert_eq!(html.matches("<section id=\"made\">").count(), 1);
+    assert_eq!(
+        html.matches("<a href=\"#made\">").count(),
+        html.matches("<figure").count()
+    );
+    // and only what was told
+    assert!(!page("a").html().unwrap().contains("#made"));
+}
+
+#[test]
+fn one_of_several_sections_is_picked_without_a_script() {
+    let sections = |count: usize| {
+        (0..count)
+            .map(|n| Section::new(format!("step {n}")).text("t"))
+            .collect()
+    };
+    let html = |count| {
+        let section = Section::new("Load steps").pick("load step", sections(count));
+        Page::new("p").section(section).html().unwrap()
+    };
+    let three = html(3);
+    assert_eq!(three.matches("type=\"radio\"").count(), 3);
+    assert_eq!(three.matches("checked=").count(), 1);
+    assert!(three.contains("<label for=\"pick-0-2\">step 2</label>") && !three.contains("<script"));
+    assert!(!html(1).contains("radio"));
+}
+
+#[test]
+fn a_picture_says_its_numbers_in_words_and_stands_in_two_widths() {
+    let series = Series::line("plant", [0.0, 1e-3, 2e-3], [5.0, 4.75, 5.25]);
+    let chart = Chart::new("Load step", Axis::new("time").unit("s"))
+        .panel(Panel::new(Axis::new("output voltage").unit("V")).series(series));
+    let section = Section::new("s").chart(chart.svg().unwrap(), "");
+    let html = Page::new("p").section(section).html().unwrap();
+    let words = "Load step. time (ms) from 0.000 to 2.000. output voltage (V): plant from 4.750 to 5.250.";
+    assert!(html.contains(words), "{html}");
+    // of a chart that answers the wide one is drawn by the script
+    assert!(!html.contains("viewBox=\"0 0 900 ") && html.contains("viewBox=\"0 0 356 "));
+    let bars = report::BarChart::new("Losses", ["light"])
+        .panel(report::BarPanel::new(Axis::new("power").unit("W")).bars("switching", [0.1]));
+    let section = Section::new("s").chart(bars.svg().unwrap(), "");
+    let html = Page::new("p").section(section).html().unwrap();
+    assert_eq!(
+        html.matches("Losses. power (mW): light: switching 100.0.").count(),
+        2,
+        "{html}"
+    );
+    assert!(html.contains("viewBox=\"0 0 900 ") && html.contains("viewBox=\"0 0 356 "));
+}
+
+#[test]
 fn numbers_of_a_column_have_equal_decimals() {
     let table = Table::new("").number("x", 2);
     let table = table

@@ -90,9 +90,10 @@ class Studio {
   }
 
   arrow(name, key) {
-    const step = { ArrowRight: 1, ArrowLeft: -1 }[key];
-    if (!step) return;
-    const next = VIEWS[(VIEWS.indexOf(name) + step + VIEWS.length) % VIEWS.length];
+    const place = VIEWS.indexOf(name), last = VIEWS.length - 1;
+    const to = { ArrowRight: place === last ? 0 : place + 1, ArrowLeft: place === 0 ? last : place - 1, Home: 0, End: last }[key];
+    if (to === undefined) return;
+    const next = VIEWS[to];
     this.select(next);
     at(`tab-${next}`).focus();
   }
@@ -125,8 +126,12 @@ class Studio {
         for (const inner of batch) await walk(inner, `${path}${entry.name}/`);
       }
     };
-    const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
-    for (const entry of entries) await walk(entry, "");
+    // all at once: the list is empty after the first pause; what is no entry of a file system may still be a file
+    const items = [...transfer.items].map((item) => [item.webkitGetAsEntry?.(), item.kind === "file" ? item.getAsFile() : null]);
+    for (const [entry, file] of items) {
+      if (entry) await walk(entry, "");
+      else if (file) found.push([file.name, file]);
+    }
     this.take(found);
   }
 

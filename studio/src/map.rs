@@ -1,7 +1,7 @@
 //! The decision map: the policy's duty over two of its signals.
 
-use interp::{Controller, Real, Sample};
-use policy::{Policy, Scalar};
+use closed_loop::{DecisionMap, decision_map};
+use policy::Policy;
 use serde::{Deserialize, Serialize};
 use toml_input::{Faults, Message};
 
@@ -74,46 +74,8 @@ pub(crate) fn map(session: &Session, wanted: &Wanted) -> Result<Reply, Faults> {
         named.map_or(0.5 * (signal.range.low + signal.range.high), |(_, value)| *value)
     };
     let rest: Vec<f64> = policy.signals.iter().map(given).collect();
-    let map = match policy.numeric_format.scalar() {
-        Scalar::F32 => cells::<f32>(&policy, wanted, axes, rest)?,
-        Scalar::F64 => cells::<f64>(&policy, wanted, axes, rest)?,
-    };
-    Reply::of(&map)
-}
-
-fn cells<T: Real>(policy: &Policy, wanted: &Wanted, axes: [usize; 2], mut at: Vec<f64>) -> Result<Map, Faults> {
-    let controller = Controller::<T>::new(policy);
-    let mut trace = controller.blank_trace();
-    let chooses = policy.head.is_choice();
-    let mut map = Map {
-        duties: Vec::with_capacity(wanted.x.cells * wanted.y.cells),
-        actions: Vec::new(),
-    };
-    for row in 0..wanted.y.cells {
-        for column in 0..wanted.x.cells {
-            (at[axes[0]], at[axes[1]]) = (wanted.x.centre(column), wanted.y.centre(row));
-            let samples: Vec<Sample> = policy
-                .signals
-                .iter()
-                .zip(&at)
-                .map(|(signal, x)| sample(policy, signal, *x))
-                .collect();
-            controller.eval_into(&samples, &mut trace)?;
-            map.duties.push(trace.duty_sim.to_f64());
-            if chooses {
-                map.actions.push(trace.action_index);
-            }
-        }
-    }
-    Ok(map)
-}
-
-/// A value as the contract takes it.
-fn sample(policy: &Policy, signal: &policy::Signal, x: f64) -> Sample {
-    match (signal.adc, policy.numeric_format.scalar()) {
-        // `as` saturates; a code out of range is the controller's to judge
-        (Some(adc), _) => Sample::Code(((x - adc.offset) / adc.gain).round() as i32),
-        (None, Scalar::F32) => Sample::Physical(x as f32),
-        (None, Scalar::F64) => Sample::Wide(x),
-    }
+    let axis = |index: usize, axis: &Axis| (index, (0..axis.cells).map(|cell| axis.centre(cell)).collect());
+    let [x, y] = [axis(axes[0], &wanted.x), axis(axes[1], &wanted.y)];
+    let DecisionMap { duties, actions } = decision_map(&policy, &x, &y, &rest)?;
+    Reply::of(&Map { duties, actions })
 }

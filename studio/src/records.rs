@@ -5,7 +5,7 @@ use std::path::Path;
 use diagnose::diagnosis::diagnose as examined;
 use diagnose::progress::Progress;
 use diagnose::record::open_all;
-use diagnose::results;
+use diagnose::results::{self, Asked};
 use measured::ColumnMap;
 use serde::{Deserialize, Serialize};
 use toml_input::{Faults, FileName};
@@ -60,5 +60,15 @@ pub(crate) fn diagnose(session: &Session, wanted: &Wanted, tell: Tell) -> Result
         sentence: diagnosis.findings.sentence.clone(),
         lines: results::answer(&columns, &paths, &diagnosis.findings),
     };
-    Reply::with(&answer, texts(results::files(&diagnosis)?))
+    let asked = Asked {
+        model: wanted.model.clone(),
+        train: wanted.train.clone(),
+        heldout: wanted.heldout.clone(),
+        map: Some(wanted.map.clone())
+            .filter(|map| !map.is_empty())
+            .into_iter()
+            .collect(),
+        others: wanted.columns.iter().map(|file| ("--columns", file.clone())).collect(),
+    };
+    Reply::with(&answer, texts(results::files_of(&diagnosis, &asked)?))
 }

@@ -137,8 +137,17 @@ fn compiled_code_drives_the_same_loop_and_the_same_files_come_twice() {
             );
         }
     }
-    desk.succeed("simulate s.toml --policy policy/policy.toml --out again");
+    desk.succeed("simulate s.toml --policy policy --out again");
     assert_eq!(contents(&desk.path("a")), contents(&desk.path("again")));
+    // the policy by another name: the page alone says how it was named
+    desk.succeed("simulate s.toml --policy policy/policy.toml --out named");
+    let but_the_page = |out: &str| {
+        let mut files = contents(&desk.path(out));
+        files.retain(|(name, _)| name != "report.html");
+        files
+    };
+    assert_eq!(but_the_page("a"), but_the_page("named"));
+    assert_eq!(contents(&desk.path("a")).len(), but_the_page("a").len() + 1);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Shared by the tests: places, policies drawn at random and long runs over them, tool runs.
 
+pub mod browser;
 pub mod fixture;
 pub mod random;
 pub mod shards;

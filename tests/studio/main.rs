@@ -1,8 +1,6 @@
 //! The page of `policyc studio` in a browser, against the command: the same code, trajectories, diagnosis and faults.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod browser;
-
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -10,10 +8,9 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use serde_json::Value;
+use tests::browser::Browser;
 use tests::root;
 use tests::tools::{policyc, run};
-
-use browser::Browser;
 
 /// Ten times what it takes on two cores.
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -25,13 +22,7 @@ fn page() -> Option<PathBuf> {
     if !made {
         eprintln!("no page of the studio (`cargo xtask studio`): NOT tested");
     }
-    // one that is there may still not start, as in a container without what it asks for
-    let mut browser = Command::new("timeout");
-    browser
-        .args(["60", "chromium", "--dump-dom"])
-        .args(browser::FLAGS)
-        .arg("about:blank");
-    let is_there = browser.output().is_ok_and(|output| output.status.success());
+    let is_there = Browser::is_there();
     if !is_there {
         eprintln!("no chromium that starts: the page of the studio is NOT tested");
     }
@@ -211,4 +202,72 @@ fn the_page_opens_an_example_and_shows_its_loop() {
         PATIENCE,
     );
     assert_eq!(width.as_i64(), Some(1), "nothing sticks out");
+}
+
+/// What stable-baselines3 saved, dropped into the page: a contract to fill in, with its weights.
+#[test]
+fn a_model_of_a_trainer_is_dropped_and_becomes_a_contract() {
+    let Some(folder) = page() else { return };
+    let temporary = tempfile::tempdir().unwrap();
+    let site = temporary.path().join("site");
+    copy(&folder, &site);
+    for name in ["sb3_dqn.zip", "gemm.onnx"] {
+        let model = root().join("tests/fixtures/trainers").join(name);
+        std::fs::copy(model, site.join("examples").join(name)).unwrap();
+    }
+    let server = Server::of(&site);
+    let mut browser = Browser::start(&temporary.path().join("profile"));
+    for name in ["sb3_dqn.zip", "gemm.onnx"] {
+        browser.ask(
+            "Page.navigate",
+            serde_json::json!({ "url": format!("{}?{name}#contract", server.1) }),
+        );
+        let ready = format!(
+            "location.search === '?{name}' && document.getElementById('status')?.textContent.startsWith('Ready')"
+        );
+        browser.value(&ready, PATIENCE);
+        let drop = format!(
+            "fetch('examples/{name}').then((answer) => answer.blob()).then((blob) => {{ const data = new DataTransfer(); \
+             data.items.add(new File([blob], '{name}')); \
+             document.documentElement.dispatchEvent(new DragEvent('drop', {{ dataTransfer: data, bubbles: true, cancelable: true }})); return true; }})"
+        );
+        browser.value(&drop, PATIENCE);
+        let contract = browser.value("document.getElementById('edit').value || null", PATIENCE);
+        assert!(contract.as_str().unwrap().contains("[network]"), "{name}: {contract}");
+    }
+}
+
+#[test]
+fn the_views_are_reached_by_keys() {
+    let Some(folder) = page() else { return };
+    let temporary = tempfile::tempdir().unwrap();
+    let server = Server::of(&folder);
+    let mut browser = Browser::start(temporary.path());
+    browser.ask(
+        "Page.navigate",
+        serde_json::json!({ "url": format!("{}#contract", server.1) }),
+    );
+    browser.value(
+        "document.getElementById('status')?.textContent.startsWith('Ready')",
+        PATIENCE,
+    );
+    browser.value("{ document.getElementById('tab-contract').focus(); true }", PATIENCE);
+    for (key, view) in [
+        ("ArrowRight", "code"),
+        ("End", "records"),
+        ("ArrowRight", "contract"),
+        ("ArrowLeft", "records"),
+        ("Home", "contract"),
+    ] {
+        for kind in ["keyDown", "keyUp"] {
+            browser.ask(
+                "Input.dispatchKeyEvent",
+                serde_json::json!({ "type": kind, "key": key, "code": key }),
+            );
+        }
+        let shown = format!(
+            "document.activeElement.id === 'tab-{view}' && !document.getElementById('panel-{view}').hidden && location.hash === '#{view}'"
+        );
+        browser.value(&shown, PATIENCE);
+    }
 }

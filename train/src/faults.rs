@@ -11,3 +11,8 @@ pub type Error = toml_input::Faults;
 pub(crate) fn of_file(path: &Path, error: &std::io::Error) -> Error {
     Fault::in_file(path, Message::new(error.to_string())).into()
 }
+
+/// The error of a library that knows nothing of input files.
+pub(crate) fn told(error: impl std::fmt::Display) -> Error {
+    Message::new(error.to_string()).into()
+}

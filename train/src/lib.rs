@@ -21,6 +21,7 @@ pub mod learner;
 pub mod network;
 pub mod optimiser;
 pub mod outcome;
+pub mod page;
 mod progress;
 pub mod replay;
 mod resume;

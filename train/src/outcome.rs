@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use plant::Sample;
+use policy::Policy;
 use toml_input::Message;
 
 use crate::contract::{Files, GoldenVectors};
@@ -45,6 +46,10 @@ pub struct Outcome {
     pub judged: Vec<Judged>,
     /// The same of the law alone that a residual policy adds to; empty without one.
     pub law: Vec<Judged>,
+    /// The looks at the selection scenarios on the way.
+    pub curve: Vec<Look>,
+    /// The policy, as its folder has it.
+    pub policy: Policy,
     /// The policy folder: contract, weights, golden vectors, `report.txt`, `evaluation.csv`, `learning-curve.csv`.
     pub files: Files,
 }
@@ -70,7 +75,7 @@ impl<E: Environment> Trainer<E> {
             .unwrap_or_default();
         let evaluated = overall(&judged);
         let golden = self.golden(&best.network)?;
-        let (_, mut files) = self.contract.folder(&best.network, &golden)?;
+        let (policy, mut files) = self.contract.folder(&best.network, &golden)?;
         let report = self.report(ended, best, &judged, &law);
         let findings = judged
             .first()
@@ -91,6 +96,8 @@ impl<E: Environment> Trainer<E> {
             findings,
             judged,
             law,
+            curve: self.curve().to_vec(),
+            policy,
             files,
         })
     }

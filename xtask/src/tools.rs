@@ -14,8 +14,10 @@ enum Source {
     RustTarget(&'static str),
     /// A Python package with its version, for the environment of [`python`].
     Python(&'static str),
+    /// A package of npm with its version, for the folder of [`npm`]. Its probe is a file in it.
+    Npm(&'static str),
 }
-use Source::{Apt, Python, RustTarget, Rustup};
+use Source::{Apt, Npm, Python, RustTarget, Rustup};
 
 /// A tool is there when its probe runs and ends with 0.
 struct Tool {
@@ -133,6 +135,12 @@ const TOOLS: &[Tool] = &[
     tool("Frama-C", &["frama-c", "-version"], Apt("frama-c-base")),
     tool("ngspice", &["ngspice", "--version"], Apt("ngspice")),
     tool("Chromium", &["chromium", "--version"], Apt("chromium")),
+    // rules of accessibility, for the pages; where npm is, which Debian has in hundreds of packages
+    tool(
+        "axe-core",
+        &["node_modules/axe-core/axe.min.js"],
+        Npm("axe-core@4.14.1"),
+    ),
     tool("ngspice's library", NGSPICE_HEADER, Apt("libngspice0-dev")),
     // FMPy builds an FMU's sources with the cmake that it brings along
     tool("make", &["make", "--version"], Apt("make")),
@@ -175,6 +183,11 @@ fn python(target_dir: &Path) -> PathBuf {
     target_dir.join("python")
 }
 
+/// The folder of npm's packages, likewise.
+fn npm(target_dir: &Path) -> PathBuf {
+    target_dir.join("npm")
+}
+
 /// The Python program of that environment.
 pub fn python_program(target_dir: &Path) -> PathBuf {
     interpreter(&python(target_dir))
@@ -182,7 +195,7 @@ pub fn python_program(target_dir: &Path) -> PathBuf {
 
 /// Those of the tools by these names that are not there.
 pub fn lacking<'a>(target_dir: &Path, names: &[&'a str]) -> Vec<&'a str> {
-    let missing = missing(TOOLS, &python(target_dir));
+    let missing = missing(TOOLS, target_dir);
     let lacks = |name: &&&str| missing.iter().any(|tool| tool.name == **name);
     names.iter().filter(lacks).copied().collect()
 }
@@ -192,10 +205,10 @@ pub const WITHOUT_PYTHON_PACKAGES: &str = "POLICYC_WITHOUT_PYTHON_PACKAGES";
 
 /// What tests must do without: names and values of environment variables.
 pub fn absent(target_dir: &Path) -> [(&'static str, String); 2] {
-    let missing = missing(TOOLS, &python(target_dir));
+    let missing = missing(TOOLS, target_dir);
     let packages = missing.iter().filter(|tool| matches!(tool.source, Python(_)));
     let packages: Vec<&str> = packages.map(|tool| tool.name).collect();
-    let stand_in = self::missing(DEBIAN_RUST, Path::new("")).is_empty();
+    let stand_in = self::missing(DEBIAN_RUST, target_dir).is_empty();
     let targets = if stand_in {
         Vec::new()
     } else {
@@ -213,8 +226,7 @@ pub fn absent(target_dir: &Path) -> [(&'static str, String); 2] {
 /// # Errors
 /// What is missing and the command to type.
 pub fn provide(target_dir: &Path, output: &Output) -> Result<Vec<String>, String> {
-    let python = python(target_dir);
-    let missing = missing(TOOLS, &python);
+    let missing = missing(TOOLS, target_dir);
     let plan = Plan::of(&missing);
     if !plan.targets.is_empty() && works(&["rustup", "--version"]) {
         let mut rustup = Command::new("rustup");
@@ -222,23 +234,27 @@ pub fn provide(target_dir: &Path, output: &Output) -> Result<Vec<String>, String
         // offline or refused: Debian's Rust is next
         let _ = process::run(&mut rustup, output);
     }
-    let explained = |error| format!("{}\n{error}", plan.message(&missing, &python));
+    let explained = |error| format!("{}\n{error}", plan.message(&missing, target_dir));
     if !plan.packages.is_empty() && may_install() {
         install(&plan, output).map_err(explained)?;
     }
-    let debian = self::missing(DEBIAN_RUST, &python);
-    let targets = Plan::of(&self::missing(TOOLS, &python)).targets;
+    let debian = self::missing(DEBIAN_RUST, target_dir);
+    let targets = Plan::of(&self::missing(TOOLS, target_dir)).targets;
     if !targets.is_empty() && !debian.is_empty() && may_install() {
         // other names in this distribution, or no network: said at the end
         let _ = install(&Plan::of(&debian), output);
     }
     if !plan.python.is_empty() && works(VENV) {
-        let (mut environment, packages) = plan.python_install(&python);
+        let (mut environment, packages) = plan.python_install(&python(target_dir));
         process::run(&mut environment, output).map_err(explained)?;
         for mut package in packages {
             // offline or refused: said at the end
             let _ = process::run(&mut package, output);
         }
+    }
+    if !plan.npm.is_empty() && works(&["npm", "--version"]) {
+        // offline or refused: said at the end
+        let _ = process::run(&mut plan.npm_install(target_dir), output);
     }
     require(target_dir)
 }
@@ -257,17 +273,16 @@ fn install(plan: &Plan, output: &Output) -> Result<(), String> {
 /// # Errors
 /// What is missing and the command to type.
 pub fn require(target_dir: &Path) -> Result<Vec<String>, String> {
-    let python = python(target_dir);
-    let (optional, others): (Vec<_>, Vec<_>) = missing(TOOLS, &python)
+    let (optional, others): (Vec<_>, Vec<_>) = missing(TOOLS, target_dir)
         .into_iter()
-        .partition(|tool| matches!(tool.source, RustTarget(_) | Python(_)));
+        .partition(|tool| matches!(tool.source, RustTarget(_) | Python(_) | Npm(_)));
     if !others.is_empty() {
-        return Err(Plan::of(&others).message(&others, &python));
+        return Err(Plan::of(&others).message(&others, target_dir));
     }
     let (targets, packages): (Vec<_>, Vec<_>) = optional
         .into_iter()
         .partition(|tool| matches!(tool.source, RustTarget(_)));
-    let debian = missing(DEBIAN_RUST, &python);
+    let debian = missing(DEBIAN_RUST, target_dir);
     let about_rust = match (targets.is_empty(), debian.is_empty()) {
         (true, _) => "NOT tested: Debian's Rust in the place of a target of rustup",
         (false, true) => "tested with Debian's Rust, for want of rustup's targets",
@@ -276,13 +291,14 @@ pub fn require(target_dir: &Path) -> Result<Vec<String>, String> {
     let said = [(about_rust, [targets, debian].concat()), ("NOT tested with", packages)];
     let said = said.into_iter().filter(|(_, tools)| !tools.is_empty());
     Ok(said
-        .map(|(what, tools)| format!("{what}: {}", Plan::of(&tools).message(&tools, &python)))
+        .map(|(what, tools)| format!("{what}: {}", Plan::of(&tools).message(&tools, target_dir)))
         .collect())
 }
 
-fn missing<'a>(tools: &'a [Tool], python: &Path) -> Vec<&'a Tool> {
+fn missing<'a>(tools: &'a [Tool], target_dir: &Path) -> Vec<&'a Tool> {
     let is_there = |tool: &&Tool| match tool.source {
-        Python(_) => works_as(&interpreter(python), tool.probe),
+        Python(_) => works_as(&python_program(target_dir), tool.probe),
+        Npm(_) => tool.probe.iter().all(|file| npm(target_dir).join(file).is_file()),
         _ => works(tool.probe),
     };
     tools.iter().filter(|tool| !is_there(tool)).collect()
@@ -318,6 +334,7 @@ struct Plan {
     components: Vec<&'static str>,
     targets: Vec<&'static str>,
     python: Vec<&'static str>,
+    npm: Vec<&'static str>,
 }
 
 impl Plan {
@@ -327,6 +344,7 @@ impl Plan {
             components: Vec::new(),
             targets: Vec::new(),
             python: Vec::new(),
+            npm: Vec::new(),
         };
         for tool in missing {
             match tool.source {
@@ -334,6 +352,7 @@ impl Plan {
                 Rustup(component) => plan.components.push(component),
                 RustTarget(triple) => plan.targets.push(triple),
                 Python(package) => plan.python.push(package),
+                Npm(package) => plan.npm.push(package),
             }
         }
         plan.packages.sort_unstable();
@@ -359,7 +378,15 @@ impl Plan {
         (environment, self.python.iter().map(install).collect())
     }
 
-    fn message(&self, missing: &[&Tool], python: &Path) -> String {
+    fn npm_install(&self, target_dir: &Path) -> Command {
+        let mut command = Command::new("npm");
+        command.args(["install", "--no-audit", "--no-fund", "--ignore-scripts", "--prefix"]);
+        command.arg(npm(target_dir)).args(&self.npm);
+        command
+    }
+
+    fn message(&self, missing: &[&Tool], target_dir: &Path) -> String {
+        let python = python(target_dir);
         let names: Vec<_> = missing.iter().map(|tool| tool.name).collect();
         let mut lines = vec![format!("not found: {}; type", names.join(", "))];
         if !self.packages.is_empty() {
@@ -375,11 +402,19 @@ impl Plan {
             lines.push(format!("    rustup target add {targets}"));
         }
         if !self.python.is_empty() {
-            let (folder, program) = (python.display(), interpreter(python));
+            let (folder, program) = (python.display(), interpreter(&python));
             let packages = self.python.join(" ");
             lines.push(format!(
                 "    python3 -m venv {folder} && {} -m pip install {packages}",
                 program.display()
+            ));
+        }
+        if !self.npm.is_empty() {
+            let folder = npm(target_dir);
+            lines.push(format!(
+                "    npm install --prefix {} {}",
+                folder.display(),
+                self.npm.join(" ")
             ));
         }
         lines.join("\n")
@@ -409,14 +444,16 @@ mod tests {
             tool("clippy", &["false"], Rustup("clippy")),
             tool("thumbv7m", &["false"], RustTarget("thumbv7m-none-eabi")),
             tool("FMPy", &["false"], Python("fmpy==1")),
+            tool("axe-core", &["axe.js"], Npm("axe-core@1")),
         ];
         let missing: Vec<_> = tools.iter().collect();
         assert_eq!(
-            Plan::of(&missing).message(&missing, Path::new("t/python")),
-            "not found: valgrind, callgrind, clippy, thumbv7m, FMPy; type\n    \
+            Plan::of(&missing).message(&missing, Path::new("t")),
+            "not found: valgrind, callgrind, clippy, thumbv7m, FMPy, axe-core; type\n    \
              sudo apt-get update && sudo apt-get install -y --no-install-recommends valgrind\n    \
              rustup component add clippy\n    rustup target add thumbv7m-none-eabi\n    \
-             python3 -m venv t/python && t/python/bin/python3 -m pip install fmpy==1"
+             python3 -m venv t/python && t/python/bin/python3 -m pip install fmpy==1\n    \
+             npm install --prefix t/npm axe-core@1"
         );
     }
 }

@@ -193,6 +193,9 @@ pub struct Compile {
     /// Folder for the generated files; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Write a page as well: sizes, budget, layers, and the line of the code that a line of the contract became
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
     /// Machine-readable
     #[arg(long)]
     pub json: bool,

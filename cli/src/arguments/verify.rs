@@ -50,8 +50,8 @@ pub struct Verify {
     /// separated by commas or given several times
     #[arg(long, value_name = "MAP", requires = "trace")]
     pub map: Vec<String>,
-    /// Also write what was found for another program, as FORM=FILE: sarif (code scanning), junit (test reports) or markdown (a
-    /// summary to read). May be given several times
+    /// Also write what was found for another program, as FORM=FILE: sarif (code scanning), junit (test reports), markdown (a
+    /// summary to read) or html (a page). May be given several times
     #[arg(long, value_name = "FORM=FILE", value_parser = sheet)]
     pub report: Vec<Asked>,
     /// Also print what was found, and faults of the input, as a service shows them beside the lines of a change

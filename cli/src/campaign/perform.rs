@@ -15,6 +15,7 @@ use super::folders;
 use crate::arguments::{Arguments, Command};
 use crate::failure::Failure;
 use crate::interruption;
+use crate::made;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::talk;
@@ -53,12 +54,14 @@ impl Performed {
 /// not of the machine.
 pub fn perform_in(folder: &Path, arguments: &[String]) -> Performed {
     let mut is_alone = false;
+    let line = arguments.iter().map(std::ffi::OsString::from).collect::<Vec<_>>();
     let performed = std::env::set_current_dir(folder)
         .map_err(|error| folders::cannot("work in", folder, &error))
         .and_then(|()| parsed(arguments))
         .map(|arguments| {
             is_alone = starts_no_program(&arguments.command);
             talk::set(arguments.loudness);
+            made::heed(line);
             output::keep_answers(|| crate::dispatch(&arguments.command))
         });
     let (result, answer) = match performed {

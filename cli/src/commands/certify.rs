@@ -13,6 +13,7 @@ use toml_input::Message;
 
 use crate::arguments::Certify;
 use crate::failure::Failure;
+use crate::made;
 use crate::outcome::Outcome;
 use crate::output;
 
@@ -54,7 +55,7 @@ struct Answer<'a> {
 /// Proves, measures, draws, writes.
 pub fn run(options: &Certify) -> Result<Outcome, Failure> {
     let policy = super::load_as(&options.policy, options.outside, options.format)?;
-    let made = make(
+    let mut made = make(
         &policy,
         &Request {
             axis: options.axis.clone(),
@@ -64,6 +65,8 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
             seed: options.seed,
         },
     )?;
+    let read = [("policy", options.policy.display().to_string())];
+    made::signed(&mut made.files, &[("--out", "certificate")], &read)?;
     output::replace_own_texts(&options.out, &made.files, options.replacing)?;
     if options.json {
         output::say_json(&Answer {

@@ -14,8 +14,10 @@ use verify::costs::{Entry, StepCosts};
 use verify::fmu::Archive;
 use verify::{Files, advice};
 
+use super::compile_page;
 use crate::arguments::Compile;
 use crate::failure::Failure;
+use crate::made;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::ownership::{self, Replacing};
@@ -83,6 +85,13 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
         Some(clock) => advice::lines(&policy, made.target, &made.outputs, &made.costs, clock)?,
         None => Vec::new(),
     };
+    if let Some(path) = &options.report {
+        output::replace_own_one(
+            path,
+            &page(options, &policy, &made, &costs, &budget)?,
+            options.replacing,
+        )?;
+    }
     if options.json {
         say_json(options, &policy, &made, &costs, budget)?;
         return Ok(Outcome::Done);
@@ -95,6 +104,40 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
         output::say(&budget.join("\n"))?;
     }
     Ok(Outcome::Done)
+}
+
+/// The page that `--report` asks for.
+fn page(
+    options: &Compile,
+    policy: &Policy,
+    made: &Made,
+    costs: &[String],
+    budget: &[String],
+) -> Result<String, Failure> {
+    let sizes = manifest::sizes(policy, made.target);
+    let files = together(&made.files, &made.archives);
+    let mut notes = code::notes(policy, made.target, &sizes, files.keys().map(Path::new));
+    notes.extend(code::decision_notes(&made.decisions));
+    let path = super::contract_path(&options.policy);
+    let text = std::fs::read_to_string(&path)?;
+    let page = compile_page::page(&compile_page::Shown {
+        policy,
+        target: made.target,
+        sizes: &sizes,
+        contract: (&path.display().to_string(), &text),
+        files: &made.files,
+        written: files
+            .iter()
+            .map(|(name, content)| (name.clone(), content.len()))
+            .collect(),
+        costs: &made.costs,
+        cost_texts: costs,
+        clock: options.clock,
+        budget,
+        notes: &notes,
+    })?;
+    let read = [("policy", options.policy.display().to_string())];
+    made::signed_page(&page, &[("--out", "generated"), ("--report", "report.html")], &read)
 }
 
 /// What `--json` prints. Keys that the manifest has, too, mean the same in both.

@@ -9,7 +9,7 @@ use ::diagnose::control::Request;
 use ::diagnose::diagnosis::{Diagnosis, diagnose};
 use ::diagnose::progress::Progress;
 use ::diagnose::record::{Record, open_all};
-use ::diagnose::results;
+use ::diagnose::results::{self, Asked};
 use closed_loop::Scenario;
 use closed_loop::scenario::Task;
 use drm::formula::Losses;
@@ -38,7 +38,11 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     if let Ok(mut shown) = shown.lock() {
         shown.line.clear();
     }
-    output::replace_own_texts(&options.out, &results::files(&diagnosis)?, options.replacing)?;
+    output::replace_own_texts(
+        &options.out,
+        &results::files_of(&diagnosis, &asked(options))?,
+        options.replacing,
+    )?;
     let named: Vec<&Path> = options
         .train
         .iter()
@@ -62,7 +66,8 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
 /// # Errors
 /// As [`run`].
 pub fn files(options: &Diagnose) -> Result<BTreeMap<String, String>, Failure> {
-    Ok(results::files(&found(options, &columns(options)?, &|_| {})?)?)
+    let found = found(options, &columns(options)?, &|_| {})?;
+    Ok(results::files_of(&found, &asked(options))?)
 }
 
 /// Reads every file that is named, and diagnoses nothing.
@@ -83,6 +88,28 @@ fn model(options: &Diagnose) -> Result<Parameters, Faults> {
     match options.policy {
         Some(_) => Parameters::buck_from_file(&options.model, "`diagnose --policy`"),
         None => Parameters::from_file(&options.model),
+    }
+}
+
+/// For the page: what was asked, but where the answer goes.
+fn asked(options: &Diagnose) -> Asked {
+    let path = |path: &PathBuf| path.display().to_string();
+    let files = [
+        ("--columns", &options.columns.columns),
+        ("--policy", &options.policy),
+        ("--scenario", &options.scenario),
+        ("--trained-on", &options.trained_on),
+    ];
+    let given = files
+        .into_iter()
+        .filter_map(|(name, file)| Some((name, path(file.as_ref()?))));
+    let settled = options.settled.then(|| ("--settled", String::new()));
+    Asked {
+        model: path(&options.model),
+        train: options.train.iter().map(path).collect(),
+        heldout: options.heldout.iter().map(path).collect(),
+        map: options.columns.map.clone(),
+        others: given.chain(settled).collect(),
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod campaign;
 pub mod certify;
 pub mod compile;
+mod compile_page;
 pub mod completions;
 mod controllers;
 pub mod demo;

@@ -10,6 +10,7 @@ use super::progress_line::ProgressLine;
 use crate::arguments::Prove;
 use crate::failure::Failure;
 use crate::interruption;
+use crate::made;
 use crate::outcome::Outcome;
 use crate::output;
 
@@ -49,6 +50,8 @@ pub fn run(options: &Prove) -> Result<Outcome, Failure> {
         ("proof.json".to_owned(), json),
         ("proof.html".to_owned(), page::page(&answer)?),
     ]);
+    let read = [("policy", options.policy.display().to_string())];
+    made::signed(&mut files, &[("--out", "proof")], &read)?;
     for task in tasks.iter().filter(|_| options.goals) {
         // where the code is not read there are none, and the claims say so
         for goal in prove::smt::goals(*task).unwrap_or_default() {

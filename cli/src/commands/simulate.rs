@@ -14,6 +14,7 @@ use super::progress_line::ProgressLine;
 use crate::arguments::Simulate;
 use crate::failure::Failure;
 use crate::interruption;
+use crate::made;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::talk;
@@ -45,7 +46,7 @@ pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
         return Ok(Outcome::Interrupted);
     }
     let found = found?;
-    let files = found.files()?;
+    let files = signed(options, &found)?;
     output::write_results(&options.out, &files)?;
     if options.json {
         found.notes().iter().for_each(|note| talk::note(note));
@@ -96,7 +97,16 @@ fn setting(options: &Simulate) -> Result<Setting, Failure> {
 /// # Errors
 /// As [`run`].
 pub fn files(options: &Simulate) -> Result<BTreeMap<String, String>, Failure> {
-    Ok(all(options, setting(options)?)?.files()?)
+    signed(options, &all(options, setting(options)?)?)
+}
+
+fn signed(options: &Simulate, found: &Findings) -> Result<BTreeMap<String, String>, Failure> {
+    let mut files = found.files()?;
+    let path = |path: &Path| path.display().to_string();
+    let mut read = vec![("scenario", path(&options.scenario)), ("policy", path(&options.policy))];
+    read.extend(options.plant.iter().map(|plant| ("plant", path(plant))));
+    made::signed(&mut files, &[("--out", "simulation")], &read)?;
+    Ok(files)
 }
 
 /// Starts the controllers and simulates.

@@ -8,7 +8,7 @@ use targets::TargetSpec;
 use toml_input::Message;
 use verify::cases::{self, Case};
 use verify::drift::Drift;
-use verify::exchange::github;
+use verify::exchange::{Sheet, github};
 use verify::traces::Recorded;
 use verify::{Folder, Options, Progress, Report, folder, text};
 
@@ -17,6 +17,7 @@ use super::verify_codes;
 use crate::arguments::Verify;
 use crate::arguments::verify::{Asked, Service};
 use crate::failure::Failure;
+use crate::made;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::talk;
@@ -121,12 +122,24 @@ pub fn told(news: Progress) -> String {
     }
 }
 
+/// For the page.
+fn read(options: &Verify) -> Vec<(&'static str, String)> {
+    let mut read = vec![("policy", options.policy.display().to_string())];
+    let generated = options.generated.iter();
+    read.extend(generated.map(|folder| ("generated files", folder.display().to_string())));
+    read
+}
+
 /// Writes and says what was found; without a report of builds it is what the files alone tell.
 fn answer(options: &Verify, policy: &Policy, drift: Option<Drift>, report: Option<Report>) -> Result<Outcome, Failure> {
     let equal = report.as_ref().is_none_or(Report::passed) && drift.as_ref().is_none_or(Drift::is_empty);
     let cases = cases(options, policy, drift.as_ref(), report.as_ref());
     for Asked { sheet, file } in &options.report {
         let text = sheet.text(&policy.name, &cases)?;
+        let text = match sheet {
+            Sheet::Html => made::signed_page(&text, &[("--report", "html=verified.html")], &read(options))?,
+            _ => text,
+        };
         output::replace_own_one(file, &text, options.replacing)?;
     }
     if options.json {

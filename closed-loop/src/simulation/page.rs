@@ -24,10 +24,11 @@ pub(super) fn page(found: &Findings, drawn: Vec<Svg>, maps: Vec<(String, Svg)>) 
     let mut page = Page::new(format!("{} in closed loop", setting.policy.name))
         .verdict(verdict, sentence)
         .section(about);
-    for (step, picture) in found.steps.iter().zip(drawn) {
+    let steps = found.steps.iter().zip(drawn).map(|(step, picture)| {
         let section = Section::new(step.step.to_string()).chart(picture, CAPTION);
-        page = page.section(section.table(table(step)).table(at_rest(step)));
-    }
+        section.table(table(step)).table(at_rest(step))
+    });
+    page = page.section(Section::new("Load steps").pick("load step", steps.collect()));
     if let Some(spread) = &found.spread {
         page = page.section(spread.section(maps));
     }
@@ -42,18 +43,24 @@ fn verdict(found: &Findings) -> (Verdict, String) {
     let compared = found.check.as_ref().map(words::check_text);
     let different = found.check.as_ref().is_some_and(|check| !check.differences.is_empty());
     let sentences = |first: String| {
-        [Some(first), compared]
-            .into_iter()
-            .flatten()
-            .collect::<Vec<_>>()
-            .join("; ")
+        let said: Vec<String> = [Some(first), compared].into_iter().flatten().collect();
+        sentence(&said.join("; "))
     };
     match words::unsettled(found) {
         Some(text) if different => (Verdict::Fail, sentences(text)),
         Some(text) => (Verdict::Warn, sentences(text)),
         None if different => (Verdict::Fail, sentences(worst(found))),
         None if found.check.is_some() => (Verdict::Pass, sentences(worst(found))),
-        None => (Verdict::Note, worst(found)),
+        None => (Verdict::Note, sentence(&worst(found))),
+    }
+}
+
+/// With a capital and a full stop, which a note among others does without.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    match letters.next() {
+        Some(first) => format!("{}{}.", first.to_uppercase(), letters.as_str()),
+        None => String::new(),
     }
 }
 

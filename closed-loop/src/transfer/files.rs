@@ -78,12 +78,15 @@ fn section(found: &Findings, real: &Real, files: &mut BTreeMap<String, String>) 
     for remark in &real.remarks {
         section = section.text(format!("No mapping repairs: {remark}."));
     }
+    let mut steps = Vec::new();
     for (index, course) in found.simulation.courses.iter().enumerate() {
         let picture = pictures::picture(found, real, index)?;
         let stem = course.finding.step().stem();
         files.insert(format!("{}-{stem}.svg", real.name), picture.as_str().to_owned());
-        section = section.chart(picture, CAPTION).table(table(found, real, index));
+        let step = Section::new(course.finding.step().to_string());
+        steps.push(step.chart(picture, CAPTION).table(table(found, real, index)));
     }
+    section = section.pick(format!("load step on {}", real.name), steps);
     let text = drm::text(&real.report).map_err(told)?;
     Ok(section.details(Section::new("Fit").code(text)))
 }

@@ -74,7 +74,7 @@ pub(super) fn section(term: &Described) -> Section {
         .unwrap_or(0);
     let states = [&term.before, &term.after];
     let caption = "The training record that the model misses most.";
-    pictures(section, &term.problem, states, worst, Some(NAME), caption)
+    pictures(section, &term.problem, states, worst, Some(NAME), &[], caption)
 }
 
 #[cfg(test)]

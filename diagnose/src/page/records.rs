@@ -3,12 +3,13 @@
 use report::{Axis, Chart, Panel, ReportError, Section, Series, Svg};
 
 use super::colours::{EXTENDED, MEASURED, MODEL};
+use super::spectrum;
 use crate::diagnosis::Diagnosis;
 use crate::findings::Verdict;
 use crate::fit::State;
 use crate::noise::channel;
 use crate::problem::{LOST, Problem};
-use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
+use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS};
 
 /// Groups of equal size in a picture by operating point.
 const GROUPS: usize = 12;
@@ -31,6 +32,7 @@ fn panels(
     after: &State,
     record: usize,
     second: Option<&str>,
+    also: &[usize],
 ) -> Result<Svg, ReportError> {
     let one = &problem.records[record];
     let axis = if one.settled && !one.repeated {
@@ -43,7 +45,7 @@ fn panels(
     let states: Vec<_> = std::iter::once(first)
         .chain(second.map(|name| (name, after, EXTENDED)))
         .collect();
-    for n in 0..2 {
+    for n in channels(also) {
         if !one.measured[n].iter().any(|v| v.is_finite()) {
             continue;
         }
@@ -79,6 +81,18 @@ fn panels(
     chart.svg()
 }
 
+/// Channels of a picture: voltage and current of the inductor always, another where `also` names it.
+fn channels(also: &[usize]) -> impl Iterator<Item = usize> {
+    (0..CHANNELS).filter(move |n| *n < 2 || also.contains(n))
+}
+
+/// Channels of a training record in which structure is left.
+fn structured(diagnosis: &Diagnosis, record: &str) -> Vec<usize> {
+    let own = diagnosis.findings.structure.iter().filter(|one| one.record == record);
+    own.filter_map(|one| CHANNEL_NAMES.iter().position(|name| *name == one.channel))
+        .collect()
+}
+
 /// Adds the pictures of a record, and says which simulation has no line in them.
 pub(super) fn pictures(
     section: Section,
@@ -86,9 +100,10 @@ pub(super) fn pictures(
     [before, after]: [&State; 2],
     record: usize,
     second: Option<&str>,
+    also: &[usize],
     caption: &str,
 ) -> Section {
-    let mut section = section.chart_or_reason(panels(problem, before, after, record, second), caption);
+    let mut section = section.chart_or_reason(panels(problem, before, after, record, second, also), caption);
     let states = std::iter::once(("model", before)).chain(second.map(|name| (name, after)));
     for (name, state) in states {
         // channels without any line, and those whose line has gaps
@@ -116,11 +131,14 @@ pub(super) fn pictures(
     section
 }
 
+/// What the second simulation is where nothing explains the records.
+pub(super) const PARTLY: &str = "best of the known causes";
+
 /// What the second simulation is, if there is one.
 pub(super) fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
     diagnosis.attribution.best.as_ref()?;
     Some(match diagnosis.findings.verdict {
-        Verdict::Unexplained => "best of the known causes",
+        Verdict::Unexplained => PARTLY,
         _ => "extended",
     })
 }
@@ -138,23 +156,41 @@ pub(super) fn training(diagnosis: &Diagnosis) -> Option<Section> {
     let worst = all().max_by(|a, b| square(*a).total_cmp(&square(*b)))?;
     let caption =
         "The training record that the model as given misses most. Initial states are estimated for each model.";
+    let also = |record: usize| structured(diagnosis, &problem.records[record].name);
     let title = match second {
         Some("extended") => "Measured, simulated, extended",
         _ => "Training records, measured and simulated",
     };
     let states = [before, after];
-    let mut section = pictures(Section::new(title), problem, states, worst, second, caption);
+    let mut section = pictures(
+        Section::new(title),
+        problem,
+        states,
+        worst,
+        second,
+        &also(worst),
+        caption,
+    );
+    let models = spectrum::models(before, after, second);
+    let measured = |n: &usize| problem.records[worst].measured[*n].iter().any(|v| v.is_finite());
+    let shown: Vec<usize> = channels(&also(worst)).filter(measured).collect();
+    if let Some(svg) = spectrum::picture(problem, &models, worst, &shown) {
+        section = section.chart_or_reason(
+            svg,
+            "Amplitude of the sine that would leave this error. Noise is flat; a peak is a line, and what rises to the left is slow.",
+        );
+    }
     if all().count() > 1 {
         let mut inner = Section::new("The other training records");
         for record in all().filter(|record| *record != worst) {
-            inner = pictures(inner, problem, states, record, second, "");
+            inner = pictures(inner, problem, states, record, second, &also(record), "");
         }
         section = section.details(inner);
     }
     match problem.sigma[0].is_finite() {
         true => Some(section.chart_or_reason(
             by_operating_point(diagnosis),
-            "Means of groups of equal size over all training records.",
+            "All rows of the training records, ordered by load current and cut into twelve groups of equal size: each dot is the mean of a group.",
         )),
         false => Some(section),
     }
@@ -190,7 +226,7 @@ fn by_operating_point(diagnosis: &Diagnosis) -> Result<Svg, ReportError> {
         let (x, y) = (mean(|p| p.0), mean(|p| p.1));
         panel = panel
             .series(Series::line(name, x.clone(), y.clone()).colour(colour))
-            .series(Series::points(format!("{name}, groups"), x, y).colour(colour));
+            .series(Series::points("", x, y).colour(colour));
     }
     Chart::new("Error by operating point", Axis::new("load current").unit("A"))
         .panel(panel)

@@ -118,8 +118,7 @@ pub(crate) fn read(
     (faults.count() == before).then_some(golden)
 }
 
-/// Whether golden answers could be those of a network with so many inputs and outputs; `is_continuous` where its one output
-/// becomes a duty. What a contract says of them, their ranges and the limits of a difference, is not judged.
+/// Whether golden answers could be those of a network that chooses, with so many inputs and actions. What a contract says of them, their ranges and the limits of a difference, is not judged.
 ///
 /// # Errors
 /// The faults that a contract which names the file would meet.
@@ -128,16 +127,16 @@ pub fn golden_fits(
     bytes: Vec<u8>,
     inputs: usize,
     outputs: usize,
-    is_continuous: bool,
 ) -> Result<(), Faults> {
     let file = Binary {
         name: name.clone(),
         bytes,
     };
+    let head = Head::Choice(Vec::new());
     let shape = Shape {
         features: inputs,
         outputs,
-        is_continuous,
+        head: &head,
     };
     let limits = Limits {
         tolerance: f64::INFINITY,

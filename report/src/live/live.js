@@ -26,6 +26,27 @@
     return value => value === null || value === undefined ? "–" : value.toFixed(digits).replace("-", "−");
   };
 
+  // labels of an axis, with as many digits as their distance needs
+  const labels = (ticks, step) => {
+    let digits = 0;
+    // a step of 0.025 has three
+    while (digits < 9 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6 * step * 10 ** digits) digits++;
+    return ticks.map(value => value === null ? "" : value.toFixed(digits).replace(/^-(?=[0.]*[1-9])/, "−").replace(/^-/, ""));
+  };
+
+  // lowest and highest value within a stretch of x; nothing where there is none
+  const extent = (x, columns, from, to) => {
+    let low = Infinity, high = -Infinity;
+    for (const values of columns) {
+      values.forEach((value, n) => {
+        if (value === null || x[n] < from || x[n] > to) return;
+        low = Math.min(low, value);
+        high = Math.max(high, value);
+      });
+    }
+    return low <= high ? [low, high] : null;
+  };
+
   // the value that a series shows at x: of a step the last before, otherwise the nearest
   const valueAt = (kind, x, y, at) => {
     let low = 0, high = x.length;
@@ -89,6 +110,7 @@
       const data = JSON.parse(figure.querySelector("script").textContent);
       const xs = data.xs.map(decode);
       const series = one => ({ ...one, x: xs[one.x], y: decode(one.y), top: one.top && decode(one.top) });
+      this.alt = figure.querySelector("svg").getAttribute("aria-label");
       this.x = data.x;
       this.panels = data.panels.map(panel => ({ ...panel, show: writer(panel.high - panel.low), series: panel.series.map(series) }));
       this.key = `chart${number}`;
@@ -96,17 +118,25 @@
       this.plots = [];
       this.rows = [];
       this.isMoving = false;
+      this.side = Math.max(...this.panels.map(panel => this.widest(panel)));
       this.box = make("div", figure, "", { className: "live" });
       figure.prepend(this.box);
       make("p", this.box, data.title, { className: "title" });
       this.addTools();
       this.addReadout(number);
       this.panels.forEach((panel, index) => this.addPlot(panel, index));
+      make("p", this.box, data.x.label, { className: "axis along" });
       this.zoom(this.x.low, this.x.high);
       this.read(null);
       figure.classList.add("answers");
       new ResizeObserver(() => this.fit()).observe(this.box);
       matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.plots.forEach(plot => plot.redraw()));
+    }
+
+    // room for the numbers of a vertical axis, with the digit more that a stretch needs
+    widest({ low, high }) {
+      const longest = Math.max(...labels([low, high], 10 ** Math.floor(Math.log10((high - low) / 50 || 1))).map(text => text.length));
+      return Math.max(40, 14 + 7 * longest);
     }
 
     width() {
@@ -134,6 +164,8 @@
       const ends = { min: Math.max(min, this.x.low), max: Math.min(max, this.x.high) };
       for (const plot of this.plots) plot.setScale("x", ends);
       this.isMoving = false;
+      this.stretch = ends;
+      if (this.isAtRest) this.read(null);
     }
 
     addTools() {
@@ -166,7 +198,11 @@
         make("i", button).style.background = all.find(series => series.name === name).colour;
         button.append(name);
         button.onclick = () => button.setAttribute("aria-pressed", String(this.toggle(name)));
-        this.rows.push({ name, cells: this.panels.map(() => make("td", row, "", { className: "n" })) });
+        this.rows.push({ name, cells: this.panels.map(panel => {
+          const cell = make("td", row, "", { className: "n" });
+          cell.dataset.of = panel.label;
+          return cell;
+        }) });
       }
     }
 
@@ -178,15 +214,21 @@
       return isShown;
     }
 
+    // the values at x, or those that the stretch reaches where nobody points
     read(at) {
+      this.isAtRest = at === null;
       const along = writer(this.x.high - this.x.low);
-      this.along.textContent = at === null ? this.x.label : `${this.x.label} ${along(at)}`;
+      this.along.textContent = this.isAtRest ? "lowest … highest" : `${this.x.label} ${along(at)}`;
+      const { min, max } = this.stretch ?? { min: this.x.low, max: this.x.high };
       for (const { name, cells } of this.rows) {
         this.panels.forEach((panel, index) => {
           const series = panel.series.find(series => series.name === name);
           if (!series) return;
-          const value = values => panel.show(this.hidden.has(name) ? null : valueAt(series.kind, series.x, values, at));
-          cells[index].textContent = at === null ? "" : value(series.y) + (series.top ? `…${value(series.top)}` : "");
+          const columns = series.top ? [series.y, series.top] : [series.y];
+          const values = this.hidden.has(name) ? [null]
+            : this.isAtRest ? extent(series.x, columns, min, max) ?? [null]
+            : columns.map(values => valueAt(series.kind, series.x, values, at));
+          cells[index].textContent = [...new Set(values.map(panel.show))].join(" … ");
         });
       }
     }
@@ -195,6 +237,8 @@
       const isLast = index === this.panels.length - 1;
       make("p", this.box, panel.label, { className: "axis" });
       const place = make("div", this.box, "", { className: "plot" });
+      place.setAttribute("role", "img");
+      place.setAttribute("aria-label", this.alt);
       const { series, bands, table } = layers(panel);
       const line = { stroke: () => ink("--line"), width: 1 };
       const axis = { stroke: () => ink("--dim"), font: `12px ${FONT}`, grid: line, ticks: { ...line, size: 4 } };
@@ -211,7 +255,8 @@
         legend: { show: false },
         cursor: { sync: { key: this.key, setSeries: false }, drag: { x: true, y: false, dist: 4 }, points: { size: 6 } },
         scales: { x: { time: false, range: (_, low, high) => [low ?? this.x.low, high ?? this.x.high] }, y: { range: height } },
-        axes: [{ ...axis, size: isLast ? 30 : 6, values: isLast ? undefined : (_, ticks) => ticks.map(() => "") }, { ...axis, size: 58 }],
+        axes: [{ ...axis, size: isLast ? 30 : 6, values: (_, ticks, __, ___, step) => isLast ? labels(ticks, step) : ticks.map(() => "") },
+          { ...axis, size: this.side, values: (_, ticks, __, ___, step) => labels(ticks, step) }],
         series,
         bands,
         hooks: {

@@ -3,6 +3,7 @@
 pub mod github;
 mod junit;
 mod markdown;
+mod page;
 mod sarif;
 
 use crate::cases::Case;
@@ -16,11 +17,13 @@ pub enum Sheet {
     Junit,
     /// A table for people.
     Markdown,
+    /// A page for people.
+    Html,
 }
 
 impl Sheet {
     /// All of them.
-    pub const ALL: [Sheet; 3] = [Sheet::Sarif, Sheet::Junit, Sheet::Markdown];
+    pub const ALL: [Sheet; 4] = [Sheet::Sarif, Sheet::Junit, Sheet::Markdown, Sheet::Html];
 
     /// Its name on the command line.
     #[must_use]
@@ -29,18 +32,20 @@ impl Sheet {
             Sheet::Sarif => "sarif",
             Sheet::Junit => "junit",
             Sheet::Markdown => "markdown",
+            Sheet::Html => "html",
         }
     }
 
     /// The text of the file; `policy` is the policy's name. The head of each says by which program it was written.
     ///
     /// # Errors
-    /// Never, in fact: texts can always be written as JSON.
+    /// Never, in fact: texts can always be written as JSON, and tables of a page have the columns that they say.
     pub fn text(self, policy: &str, cases: &[Case]) -> Result<String, serde_json::Error> {
         Ok(match self {
             Sheet::Sarif => sarif::text(cases)?,
             Sheet::Junit => junit::text(policy, cases),
             Sheet::Markdown => markdown::text(policy, cases),
+            Sheet::Html => page::text(policy, cases).map_err(serde::ser::Error::custom)?,
         })
     }
 }

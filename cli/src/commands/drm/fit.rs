@@ -25,8 +25,8 @@ pub struct Made {
 pub fn run(options: &Fit) -> Result<Outcome, Failure> {
     let made = make(options, options.report.is_some())?;
     output::replace_own_one(&options.out, &made.mapping, options.replacing)?;
-    if let (Some(path), Some(page)) = (&options.report, &made.page) {
-        output::replace_own_one(path, page, options.replacing)?;
+    if let (Some(path), Some(page)) = (&options.report, signed(options, &made)?) {
+        output::replace_own_one(path, &page, options.replacing)?;
     }
     if options.json {
         output::say(&made.json)?;
@@ -35,6 +35,17 @@ pub fn run(options: &Fit) -> Result<Outcome, Failure> {
         output::say(&format!("\nwrote {}", options.out.display()))?;
     }
     Ok(Outcome::Done)
+}
+
+/// The page with what made it.
+///
+/// # Errors
+/// None in practice.
+pub fn signed(options: &Fit, made: &Made) -> Result<Option<String>, Failure> {
+    let read = [("table", options.table.display().to_string())];
+    let signed =
+        |page: &String| crate::made::signed_page(page, &[("--out", "drm.toml"), ("--report", "report.html")], &read);
+    made.page.as_ref().map(signed).transpose()
 }
 
 /// The mapping of a table; nothing is written.

@@ -12,6 +12,7 @@ use crate::commands::controllers;
 use crate::commands::progress_line::ProgressLine;
 use crate::failure::Failure;
 use crate::interruption;
+use crate::made;
 use crate::outcome::Outcome;
 use crate::output;
 
@@ -31,7 +32,14 @@ pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
         return Ok(Outcome::Interrupted);
     }
     let found = found?;
-    let files = found.files()?;
+    let mut files = found.files()?;
+    let real: Vec<String> = options.real.iter().map(|path| path.display().to_string()).collect();
+    let read = [
+        ("scenario", options.scenario.display().to_string()),
+        ("policy", options.policy.display().to_string()),
+        ("converters", real.join(", ")),
+    ];
+    made::signed(&mut files, &[("--out", "transfer")], &read)?;
     output::write_results(&options.out, &files)?;
     output::say_results(&options.out, &files, &found.summary(), PAGE)?;
     Ok(Outcome::Done)

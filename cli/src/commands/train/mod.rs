@@ -7,11 +7,14 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use toml_input::{FileName, Message};
 use train::summary::Summary;
-use train::{Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, seeds, tables, train_all};
+use train::{
+    Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, page, seeds, tables, train_all,
+};
 
 use crate::arguments::Train;
 use crate::failure::Failure;
 use crate::interruption;
+use crate::made;
 use crate::outcome::Outcome;
 use crate::output;
 use report::grouped;
@@ -26,6 +29,7 @@ use progress::Watcher;
 /// the selection scenarios and for writing.
 const CHECKPOINT_EVERY: Duration = Duration::from_secs(3);
 const SEEDS: &str = "seeds";
+const PAGE: &str = "report.html";
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -67,7 +71,7 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     let Some(best) = seeds::best(&runs) else {
         return Err(Message::new("no seed was trained").into());
     };
-    write(&options.out, &settings, &runs, best)?;
+    write(options, &settings, &runs, best)?;
     kept.remove();
     report(options, &settings, &runs, best, start.elapsed())
 }
@@ -84,12 +88,20 @@ pub fn check(options: &Train) -> Result<(), Failure> {
 }
 
 /// Writes the seeds' folders, the best one's last: a folder with a `policy.toml` is a whole training.
-fn write(out: &Path, settings: &Settings, runs: &[SeedRun], best: &Trained) -> Result<(), Failure> {
+fn write(options: &Train, settings: &Settings, runs: &[SeedRun], best: &Trained) -> Result<(), Failure> {
+    let out = &options.out;
     for outcome in runs.iter().filter_map(|run| run.outcome.as_ref()) {
         output::write_all(&out.join(SEEDS).join(outcome.seed.to_string()), &outcome.files)?;
     }
     let mut files = best.files.clone();
     files.insert("seeds.txt".to_owned(), seeds::table(settings, runs).into_bytes());
+    let read = [
+        ("training file", options.settings.display().to_string()),
+        ("contract", settings.contract.display().to_string()),
+        ("plant", settings.plant.display().to_string()),
+    ];
+    let page = made::signed_page(&page::page(settings, runs, best)?, &[("--out", "policy")], &read)?;
+    files.insert(PAGE.to_owned(), page.into_bytes());
     output::write_all(out, &files)
 }
 
@@ -121,7 +133,7 @@ fn report(
         tables(&best.judged, &best.law)
     ));
     text.push_str(&format!(
-        "\n{} control periods in {seconds:.1} s; policy in {out}, all seeds in {out}/{SEEDS}\n\
+        "\n{} control periods in {seconds:.1} s; policy in {out}, all seeds in {out}/{SEEDS}; to look at: {out}/{PAGE}\n\
          next: policyc verify {out}",
         grouped(steps)
     ));

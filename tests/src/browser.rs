@@ -1,4 +1,6 @@
-//! A browser without a screen, asked over its debugging pipe: messages in JSON, each ended by a zero byte.
+//! A browser without a screen, asked over its debugging pipe: messages in JSON, each ended by a zero byte. A test has no better answer
+//! to a browser that does not than to fail, so these functions panic.
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -10,6 +12,8 @@ use serde_json::{Value, json};
 /// Without a screen, for root, and with as little shared memory as a container has.
 pub const FLAGS: [&str; 4] = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"];
 
+/// A browser with one page.
+#[derive(Debug)]
 pub struct Browser {
     child: Child,
     input: ChildStdin,
@@ -19,7 +23,21 @@ pub struct Browser {
 }
 
 impl Browser {
+    /// Whether one starts: one that is there may still not, as in a container without what it asks for.
+    #[must_use]
+    pub fn is_there() -> bool {
+        let mut browser = Command::new("timeout");
+        browser
+            .args(["60", "chromium", "--dump-dom"])
+            .args(FLAGS)
+            .arg("about:blank");
+        browser.output().is_ok_and(|output| output.status.success())
+    }
+
     /// Started with a profile in `folder`.
+    ///
+    /// # Panics
+    /// If it does not start.
     pub fn start(folder: &Path) -> Self {
         // the browser reads at descriptor 3 and writes at 4
         let flags = FLAGS.join(" ");
@@ -48,6 +66,10 @@ impl Browser {
         browser
     }
 
+    /// The answer to a command of the debugging protocol.
+    ///
+    /// # Panics
+    /// If the browser has ended or refuses.
     pub fn ask(&mut self, method: &str, parameters: Value) -> Value {
         self.last += 1;
         let mut message = json!({"id": self.last, "method": method, "params": parameters});
@@ -69,13 +91,16 @@ impl Browser {
         }
     }
 
-    /// The value of `expression` as soon as it is one.
+    /// The value of `expression` as soon as it is one; a promise is waited for.
+    ///
+    /// # Panics
+    /// If there is none within `patience`.
     pub fn value(&mut self, expression: &str, patience: Duration) -> Value {
         let begun = Instant::now();
         while begun.elapsed() < patience {
             let found = self.ask(
                 "Runtime.evaluate",
-                json!({"expression": expression, "returnByValue": true}),
+                json!({"expression": expression, "returnByValue": true, "awaitPromise": true}),
             );
             match &found["result"]["value"] {
                 Value::Null | Value::Bool(false) => std::thread::sleep(Duration::from_millis(50)),

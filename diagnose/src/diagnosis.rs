@@ -25,6 +25,7 @@ use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 use crate::words::{nearest, other_carrier as other_carrier_said, sentence, shifted, si};
+use crate::whiteness;
 use crate::worth::{self, Worth};
 
 /// Everything a report shows.
@@ -108,14 +109,15 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         compared,
         verdict: match set_aside {
             Some(_) => Verdict::MostlyExplained,
-            None => found.verdict,
+            None => found.verdict_with_lines(),
         },
         partial: if explained { Vec::new() } else { found.named.clone() },
         causes: answer.causes,
         partial_gain: answer.partial_gain,
         set_aside,
         empirical: empirical.as_ref().map(|term| term.findings.clone()),
-        structure: found.structure.clone(),
+        structure: found.structure.iter().chain(&found.lines).cloned().collect(),
+        residuals: whiteness::of(&found.problem, &found.attribution.null, found.attribution.state()),
         doubts: doubts::said(&found.doubts),
         not_detectable: answer.not_detectable,
         next_experiments: answer.next_experiments,

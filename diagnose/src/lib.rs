@@ -32,6 +32,7 @@ mod doubts;
 pub mod drive;
 mod duty_steps;
 pub mod empirical;
+mod exact;
 mod examine;
 pub mod extend;
 pub mod fast;

@@ -1,5 +1,6 @@
 //! Profile likelihood: how well the data hold each parameter when all others may follow.
 
+use crate::exact::Exact;
 use crate::attribute::Attribution;
 use crate::causes::Search;
 use crate::level::ACCURACY;
@@ -128,7 +129,7 @@ pub fn profiles(problem: &Problem, attribution: &Attribution, say: Listener<'_>)
                 _ => statistical,
             };
             // noise and the simulator's error have nothing to do with each other: they add in squares
-            let reach = at.signum() * statistical.hypot(systematic);
+            let reach = at.signum() * statistical.hypotenuse(systematic);
             profile.interval[side] = (value + reach).clamp(low, high);
         }
         profile.curve.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -79,19 +79,24 @@ fn what_a_wrong_circuit_leaves_is_no_line() {
     assert!(alarms <= 1, "{alarms} of 40");
 }
 
-const QUARTER: &[f64] = &[1.0, 1.0, -1.0, -1.0];
-const HALF: &[f64] = &[1.0, -1.0];
-const FIFTH: &[f64] = &[1.0, 1.0, 0.0, -1.0, -1.0];
+/// Patterns, each with the amplitude of its line in the current that a duty of 1 makes, A: 10 A a period at 200 V, 2 mH and 10 kHz, a triangle of
+/// two periods to either side, a zigzag of one, and a course over five.
+const QUARTER: (&[f64], f64) = (&[1.0, 1.0, -1.0, -1.0], 7.07);
+const HALF: (&[f64], f64) = (&[1.0, -1.0], 5.0);
+const FIFTH: (&[f64], f64) = (&[1.0, 1.0, 0.0, -1.0, -1.0], 13.0);
+/// Amplitude of the noise's own line in n rows, times their root: 0.05 A on two sides of the spectrum, or on the one at half the rate.
+const NOISE_LINE: f64 = 0.1;
 
 #[test]
 fn a_dither_of_the_duty_is_seen() {
     let random = &mut Noise(33);
-    for pattern in [QUARTER, HALF, FIFTH] {
+    for (pattern, gain) in [QUARTER, HALF, FIFTH] {
         let mut hits = 0;
         for n in 0..20 {
-            let rows = [120, 200, 300, 500][n % 4];
-            // in the current a period of 0.002 of the duty makes 0.02 A; with both ways it is some ten times the noise line of 250 rows
-            hits += usize::from(seen(&table(rows, (0.006, pattern), &Bench::default(), random)) > 0);
+            let rows: usize = [120, 200, 300, 500][n % 4];
+            let one_sided = if pattern.len() == 2 { 0.5 } else { 1.0 };
+            let dither = 10.0 * one_sided * NOISE_LINE / (rows as f64).sqrt() / gain;
+            hits += usize::from(seen(&table(rows, (dither, pattern), &Bench::default(), random)) > 0);
         }
         assert!(hits >= 19, "{hits} of 20 with {pattern:?}");
     }
@@ -101,7 +106,7 @@ fn a_dither_of_the_duty_is_seen() {
 fn a_line_alone_is_unexplained_and_beside_a_cause_it_is_said() {
     let random = &mut Noise(34);
     let good = Bench::default();
-    let healthy = table(250, (0.006, QUARTER), &good, random).read("run", &model()).unwrap();
+    let healthy = table(250, (0.006, QUARTER.0), &good, random).read("run", &model()).unwrap();
     let found = diagnose(&model(), vec![healthy], &[], &|_| ()).findings;
     assert_eq!(found.verdict, Verdict::Unexplained, "{}", found.sentence);
     assert!(
@@ -113,7 +118,7 @@ fn a_line_alone_is_unexplained_and_beside_a_cause_it_is_said() {
         capacitance: 120e-6,
         ..good
     };
-    let both = table(250, (0.006, QUARTER), &changed, random).read("run", &model()).unwrap();
+    let both = table(250, (0.006, QUARTER.0), &changed, random).read("run", &model()).unwrap();
     let found = diagnose(&model(), vec![both], &[], &|_| ()).findings;
     println!("{}", found.sentence);
     assert_eq!(found.verdict, Verdict::MostlyExplained, "{}", found.sentence);

@@ -25,8 +25,8 @@ use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
-use crate::words::{nearest, other_carrier as other_carrier_said, sentence, shifted, si};
 use crate::whiteness;
+use crate::words::{nearest, other_carrier as other_carrier_said, sentence, shifted, si};
 use crate::worth::{self, Worth};
 
 /// Everything a report shows.
@@ -153,7 +153,14 @@ fn better(found: &Examined, f_sw: f64) -> (State, f64) {
         _ => {
             let state = found.attribution.state().clone();
             let trim = state.starts.trim_or_none(f_sw);
-            (state, if is_resolved(&found.attribution, trim) { trim } else { 0.0 })
+            (
+                state,
+                if is_resolved(&found.attribution, trim) {
+                    trim
+                } else {
+                    0.0
+                },
+            )
         }
     }
 }

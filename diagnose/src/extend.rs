@@ -180,7 +180,10 @@ fn notes(diagnosis: &Diagnosis, after: &Parameters, trim: f64) -> BTreeMap<&'sta
             false => "",
         };
         let was = edited::value(parameter, was);
-        notes.insert(parameter.key, format!("{}; {interval}{beside}was {was}", parameter.unit));
+        notes.insert(
+            parameter.key,
+            format!("{}; {interval}{beside}was {was}", parameter.unit),
+        );
     }
     notes
 }

@@ -107,9 +107,13 @@ fn words(peak: &Peak, rows: usize, rate: f64, sigma: f64, unit: &'static str) ->
     let part = PARTS.iter().find(|(part, _)| same(part.recip()));
     let mains = MAINS.iter().find(|mains| same(**mains / rate));
     let like = match (part, mains) {
-        (Some((_, word)), _) => format!("the same in every {word} row: a dither, a limit cycle, a duty that goes between two counts"),
+        (Some((_, word)), _) => {
+            format!("the same in every {word} row: a dither, a limit cycle, a duty that goes between two counts")
+        }
         (_, Some(mains)) => format!("that of mains of {mains} Hz"),
-        _ => "a limit cycle, or a disturbance that may lie above half the rate of the rows and is folded down".to_owned(),
+        _ => {
+            "a limit cycle, or a disturbance that may lie above half the rate of the rows and is folded down".to_owned()
+        }
     };
     format!(
         "a line at {:.0} Hz of {} ({:.0} times the noise at that frequency in power), {like}",
@@ -150,7 +154,11 @@ pub fn peaks(values: &[f64], before: &[f64]) -> Vec<Peak> {
         let floor = floor + ACCURACY * ACCURACY * was[at] / colour[at];
         let ratio = power[at] / floor.max(f64::MIN_POSITIVE);
         // |X|^2 / n of a sine of amplitude A is n A^2 / 4, at half the rate n A^2
-        let quarter = if (0.5 - frequency) * (values.len() as f64) < 0.5 { 1.0 } else { 0.25 };
+        let quarter = if (0.5 - frequency) * (values.len() as f64) < 0.5 {
+            1.0
+        } else {
+            0.25
+        };
         let amplitude = (raw[at] / (quarter * known as f64)).sqrt();
         if ratio > level(values.len(), near) && amplitude > LEAST {
             list.push(Peak {
@@ -205,7 +213,9 @@ fn colour(raw: &[f64], (fine, wide): (f64, usize)) -> Vec<f64> {
     let lagged: Vec<f64> = (0..=order)
         .map(|lag| {
             let each = cut.iter().enumerate();
-            let sum: f64 = each.map(|(n, p)| p * libm::cos(PI * (lag * n * step) as f64 / bins as f64)).sum();
+            let sum: f64 = each
+                .map(|(n, p)| p * libm::cos(PI * (lag * n * step) as f64 / bins as f64))
+                .sum();
             sum / cut.len() as f64
         })
         .collect();
@@ -294,7 +304,10 @@ mod tests {
 
     impl Noise {
         fn uniform(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (self.0 >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         }
 
@@ -381,7 +394,8 @@ mod tests {
                         all += 1;
                         let found = peaks(&values, &[0.0].repeat(rows));
                         let hit = found.iter().any(|peak| {
-                            (peak.frequency - f).abs() * (rows as f64) < 1.0 && (peak.amplitude / size - 1.0).abs() < 0.5
+                            (peak.frequency - f).abs() * (rows as f64) < 1.0
+                                && (peak.amplitude / size - 1.0).abs() < 0.5
                         });
                         seen += usize::from(hit || size < super::LEAST);
                     }
@@ -403,7 +417,10 @@ mod tests {
                 let each = values.iter().enumerate();
                 each.map(|(n, v)| v * f(TAU * (k * n) as f64 / 16.0)).sum()
             };
-            assert!((re[k] - sum(f64::cos)).abs() < 1e-9 && (im[k] + sum(f64::sin)).abs() < 1e-9, "{k}");
+            assert!(
+                (re[k] - sum(f64::cos)).abs() < 1e-9 && (im[k] + sum(f64::sin)).abs() < 1e-9,
+                "{k}"
+            );
         }
     }
 }

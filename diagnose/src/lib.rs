@@ -64,6 +64,6 @@ mod spectrum;
 pub mod ties;
 pub mod timing;
 mod unsure_levels;
-mod words;
 pub mod whiteness;
+mod words;
 pub mod worth;

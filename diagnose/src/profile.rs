@@ -1,8 +1,8 @@
 //! Profile likelihood: how well the data hold each parameter when all others may follow.
 
-use crate::exact::Exact;
 use crate::attribute::Attribution;
 use crate::causes::Search;
+use crate::exact::Exact;
 use crate::level::ACCURACY;
 use crate::problem::Problem;
 use crate::progress::{self, Listener};

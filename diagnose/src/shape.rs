@@ -122,8 +122,13 @@ fn followed(problem: &Problem, (index, n): (usize, usize), values: &[f64]) -> St
         })
         .collect();
     let row: Vec<f64> = (0..values.len()).map(|n| n as f64).collect();
-    let current: Vec<f64> = record.measured[1].iter().map(|i| if i.is_finite() { *i } else { 0.0 }).collect();
-    let rests: Vec<f64> = (0..record.rows()).map(|row| f64::from(u8::from(is_at_rest(problem, record, row)))).collect();
+    let current: Vec<f64> = record.measured[1]
+        .iter()
+        .map(|i| if i.is_finite() { *i } else { 0.0 })
+        .collect();
+    let rests: Vec<f64> = (0..record.rows())
+        .map(|row| f64::from(u8::from(is_at_rest(problem, record, row))))
+        .collect();
     let courses: [(&[f64], &str); 5] = [
         (&rests, "slow, where the current rests in each period (DCM)"),
         (&load, "slow, following the load current"),
@@ -136,7 +141,9 @@ fn followed(problem: &Problem, (index, n): (usize, usize), values: &[f64]) -> St
     let most = all.iter().map(|(r, _)| r * r).fold(share, f64::max);
     if most < ALIKE * ALIKE {
         let [_, load, duty, _, time] = all.map(|(r, _)| r);
-        return format!("slow, following neither duty nor load nor time alone (correlations {duty:.2}, {load:.2}, {time:.2})");
+        return format!(
+            "slow, following neither duty nor load nor time alone (correlations {duty:.2}, {load:.2}, {time:.2})"
+        );
     }
     match all.iter().find(|(r, _)| r * r > most - AS_WELL) {
         Some((r, words)) => format!("{words} (correlation {r:.2})"),
@@ -169,7 +176,10 @@ fn burst(values: &[f64], total: f64) -> Option<(usize, f64)> {
 
 /// Where the mean before and after differ most, by how much, and the share of the square of the means that this makes.
 fn largest_step(values: &[f64]) -> (usize, f64, f64) {
-    let means: Vec<f64> = values.chunks(BLOCK).map(|block| block.iter().sum::<f64>() / block.len() as f64).collect();
+    let means: Vec<f64> = values
+        .chunks(BLOCK)
+        .map(|block| block.iter().sum::<f64>() / block.len() as f64)
+        .collect();
     let n = means.len();
     let mean = means.iter().sum::<f64>() / n.max(1) as f64;
     let square: f64 = means.iter().map(|v| (v - mean) * (v - mean)).sum();
@@ -185,7 +195,11 @@ fn largest_step(values: &[f64]) -> (usize, f64, f64) {
             best = (at * BLOCK, step, weight);
         }
     }
-    (best.0.min(values.len().saturating_sub(1)), best.1, best.2 / square.max(f64::MIN_POSITIVE))
+    (
+        best.0.min(values.len().saturating_sub(1)),
+        best.1,
+        best.2 / square.max(f64::MIN_POSITIVE),
+    )
 }
 
 /// Correlation of block means, in which white noise weighs little.

@@ -67,7 +67,10 @@ pub fn of(problem: &Problem, null: &State, state: &State) -> Vec<Whiteness> {
             if rows.len() < FEWEST {
                 continue;
             }
-            let signal: Vec<f64> = rows.iter().map(|row| record.measured[n][*row] / problem.sigma[n]).collect();
+            let signal: Vec<f64> = rows
+                .iter()
+                .map(|row| record.measured[n][*row] / problem.sigma[n])
+                .collect();
             let pick = |values: &[f64]| rows.iter().map(|row| values[*row]).collect::<Vec<f64>>();
             let load: Vec<f64> = (record.load.iter())
                 .map(|load| load.current + load.conductance * problem.bases.v + load.power / problem.bases.v)
@@ -141,7 +144,9 @@ mod tests {
     fn noise(count: usize, seed: u64) -> Vec<f64> {
         let mut state = seed;
         let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
         (0..count).map(|_| (0..12).map(|_| uniform()).sum()).collect()
@@ -153,7 +158,10 @@ mod tests {
         for limit in [0.1, 0.5, 0.9] {
             let share = chances.iter().filter(|chance| **chance < limit).count() as f64 / 200.0;
             // three standard deviations of a share of 200
-            assert!((share - limit).abs() < 3.0 * (limit * (1.0 - limit) / 200.0).sqrt(), "{limit}: {share}");
+            assert!(
+                (share - limit).abs() < 3.0 * (limit * (1.0 - limit) / 200.0).sqrt(),
+                "{limit}: {share}"
+            );
         }
         let white = noise(300, 5);
         let coloured: Vec<f64> = white.windows(2).map(|pair| pair[1] + 0.6 * pair[0]).collect();

@@ -16,7 +16,9 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>) -> St
     let lines = shapes(&found.lines);
     let beside = match found.lines.is_empty() {
         true => String::new(),
-        false => format!(" Beside it there is {lines}. No cause of the list makes that, and what was found does not hang on it."),
+        false => format!(
+            " Beside it there is {lines}. No cause of the list makes that, and what was found does not hang on it."
+        ),
     };
     match found.verdict {
         Verdict::Unexplained => {
@@ -107,7 +109,10 @@ pub fn told(id: &str, value: f64, of: &'static str) -> String {
 pub fn other_carrier(found: &Examined) -> String {
     let carrier = found.read_off.iter().find(|cause| cause.id == timing::ID);
     carrier.map_or_else(String::new, |cause| {
-        format!(" That is so with the carrier that the current shows, {}, too.", values(std::slice::from_ref(cause)))
+        format!(
+            " That is so with the carrier that the current shows, {}, too.",
+            values(std::slice::from_ref(cause))
+        )
     })
 }
 

@@ -26,11 +26,16 @@ fn table(rows: usize, dither: (f64, &[f64]), changed: &Bench, random: &mut Noise
     let set = |n: usize| if n < at(0.25) { low } else { 1.4 * low };
     let bench = Bench {
         rows,
-        duty: (0..rows).map(|n| (n, duty(n) + dither.0 * dither.1[n % dither.1.len()])).collect(),
+        duty: (0..rows)
+            .map(|n| (n, duty(n) + dither.0 * dither.1[n % dither.1.len()]))
+            .collect(),
         load: vec![(0.0, 0.0, low), (at(0.25) as f64, 0.0, 1.4 * low)],
         ..changed.clone()
     };
-    let mut table = bench.run().without(&["i_out", "v_in"]).with("i_load", (0..rows).map(set).collect());
+    let mut table = bench
+        .run()
+        .without(&["i_out", "v_in"])
+        .with("i_load", (0..rows).map(set).collect());
     *table.column("duty") = (0..rows).map(duty).collect();
     table.measured(&[("v_out", 0.1, 0.02), ("i_l", 0.05, 5e-3)], random)
 }
@@ -69,8 +74,14 @@ fn what_a_wrong_circuit_leaves_is_no_line() {
     for n in 0..40 {
         let good = Bench::default();
         let changed = match n % 4 {
-            0 => Bench { capacitance: 0.8 * good.capacitance, ..good },
-            1 => Bench { inductance: 0.85 * good.inductance, ..good },
+            0 => Bench {
+                capacitance: 0.8 * good.capacitance,
+                ..good
+            },
+            1 => Bench {
+                inductance: 0.85 * good.inductance,
+                ..good
+            },
             2 => Bench { esr: 0.2, ..good },
             _ => Bench { dcr: 0.5, ..good },
         };
@@ -106,11 +117,14 @@ fn a_dither_of_the_duty_is_seen() {
 fn a_line_alone_is_unexplained_and_beside_a_cause_it_is_said() {
     let random = &mut Noise(34);
     let good = Bench::default();
-    let healthy = table(250, (0.006, QUARTER.0), &good, random).read("run", &model()).unwrap();
+    let healthy = table(250, (0.006, QUARTER.0), &good, random)
+        .read("run", &model())
+        .unwrap();
     let found = diagnose(&model(), vec![healthy], &[], &|_| ()).findings;
     assert_eq!(found.verdict, Verdict::Unexplained, "{}", found.sentence);
     assert!(
-        found.sentence.starts_with("The model explains the records but for") && found.sentence.contains("the same in every fourth row"),
+        found.sentence.starts_with("The model explains the records but for")
+            && found.sentence.contains("the same in every fourth row"),
         "{}",
         found.sentence
     );
@@ -118,11 +132,20 @@ fn a_line_alone_is_unexplained_and_beside_a_cause_it_is_said() {
         capacitance: 120e-6,
         ..good
     };
-    let both = table(250, (0.006, QUARTER.0), &changed, random).read("run", &model()).unwrap();
+    let both = table(250, (0.006, QUARTER.0), &changed, random)
+        .read("run", &model())
+        .unwrap();
     let found = diagnose(&model(), vec![both], &[], &|_| ()).findings;
     println!("{}", found.sentence);
     assert_eq!(found.verdict, Verdict::MostlyExplained, "{}", found.sentence);
-    assert_eq!(found.causes.iter().map(|cause| cause.id).collect::<Vec<_>>(), ["c_wrong"]);
-    assert!(found.sentence.contains("No cause of the list makes that"), "{}", found.sentence);
+    assert_eq!(
+        found.causes.iter().map(|cause| cause.id).collect::<Vec<_>>(),
+        ["c_wrong"]
+    );
+    assert!(
+        found.sentence.contains("No cause of the list makes that"),
+        "{}",
+        found.sentence
+    );
     assert!(found.structure.iter().any(|one| one.shape.contains("line at 2500 Hz")));
 }

@@ -5,8 +5,8 @@ mod inductor;
 
 use plant::Parameters;
 
-use crate::exact::Exact;
 use super::{Capture, GAIN, Level};
+use crate::exact::Exact;
 use crate::words::{si, unit};
 
 /// A number that a capture shows.
@@ -208,7 +208,9 @@ fn ripples(capture: &Capture, out: &mut Estimates) {
         // what was cut off was larger
         if let Some(fold) = capture.folds[n].as_ref().filter(|fold| !fold.has_holes()) {
             let bin = fold.noise / capture.bins.periods.max(1.0).sqrt();
-            let sd = (GAIN * fold.ripple()).hypotenuse(2.0 * bin).hypotenuse(fold.step / 12f64.sqrt());
+            let sd = (GAIN * fold.ripple())
+                .hypotenuse(2.0 * bin)
+                .hypotenuse(fold.step / 12f64.sqrt());
             out.values.push(around(
                 name,
                 (fold.ripple(), sd),

@@ -1,8 +1,8 @@
 //! What the switch node shows between its edges, and whether the current rests.
 
-use crate::exact::Exact;
 use super::fold::{Bins, Fold};
 use super::{Level, Node, Pulse, accuracy};
+use crate::exact::Exact;
 
 /// Levels are read off the middle of an interval: edges ring at its start.
 const MIDDLE: (f64, f64) = (0.25, 0.75);

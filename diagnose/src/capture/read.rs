@@ -3,10 +3,10 @@
 use plant::{Load, Parameters};
 use toml_input::Message;
 
-use crate::exact::Exact;
 use super::edges::{At, Brackets, Edges, levels, of_node, repeated};
 use super::fold::{Bins, Fold};
 use super::{Capture, Level, Origin, Pulse, accuracy, alike, clean, node, period};
+use crate::exact::Exact;
 use crate::record::{CHANNEL_NAMES, CHANNELS};
 
 /// Fewest samples in a period of a capture: a triangle and a parabola need some on each of their sides.

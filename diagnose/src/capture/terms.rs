@@ -11,10 +11,10 @@
 
 use plant::{Carrier, Load, Parameters, Plant, Rectifier, Sensor, Waveform};
 
-use crate::exact::Exact;
 use super::fold::bin_mean;
 use super::{Capture, GAIN, Origin};
 use crate::drive::{Model, sensors};
+use crate::exact::Exact;
 use crate::record::CHANNELS;
 
 /// Looks in a period of the plant: a ripple's parabola is off by 1e-5 of itself between them.

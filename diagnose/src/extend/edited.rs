@@ -19,7 +19,12 @@ pub fn value(parameter: &Parameter, number: f64) -> String {
 }
 
 /// `text`, which describes `before`, with the numbers of `after`; nothing if it does not read so then.
-pub fn edited(text: &str, before: &Parameters, after: &Parameters, notes: &BTreeMap<&'static str, String>) -> Option<String> {
+pub fn edited(
+    text: &str,
+    before: &Parameters,
+    after: &Parameters,
+    notes: &BTreeMap<&'static str, String>,
+) -> Option<String> {
     let is_changed = |parameter: &&Parameter| parameter.get(before) != parameter.get(after);
     let mut missing: Vec<&Parameter> = plant::parameters().filter(is_changed).collect();
     let mut lines: Vec<String> = Vec::new();
@@ -52,7 +57,12 @@ pub fn edited(text: &str, before: &Parameters, after: &Parameters, notes: &BTree
     let mut tables: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for parameter in missing {
         let (table, key) = parameter.key.rsplit_once('.')?;
-        let line = with_note(&format!("{key} = {}", value(parameter, parameter.get(after))), parameter, notes, "");
+        let line = with_note(
+            &format!("{key} = {}", value(parameter, parameter.get(after))),
+            parameter,
+            notes,
+            "",
+        );
         match ends.get(table) {
             Some(end) => added.entry(*end).or_default().push(line),
             None => tables.entry(table).or_default().push(line),
@@ -77,7 +87,12 @@ pub fn edited(text: &str, before: &Parameters, after: &Parameters, notes: &BTree
 fn replaced(line: &str, parameter: &Parameter, after: &Parameters, notes: &BTreeMap<&'static str, String>) -> String {
     let (left, right) = line.split_once('=').unwrap_or((line, ""));
     let comment = right.split_once('#').map_or("", |(_, comment)| comment.trim());
-    with_note(&format!("{left}= {}", value(parameter, parameter.get(after))), parameter, notes, comment)
+    with_note(
+        &format!("{left}= {}", value(parameter, parameter.get(after))),
+        parameter,
+        notes,
+        comment,
+    )
 }
 
 fn with_note(line: &str, parameter: &Parameter, notes: &BTreeMap<&'static str, String>, comment: &str) -> String {
@@ -113,7 +128,10 @@ mod tests {
         let notes = BTreeMap::from([("converter.capacitance", "F; was 0.00015".to_owned())]);
         let made = edited(TEXT, &before, &after, &notes).unwrap();
         let wanted = TEXT
-            .replace("150e-6  # two in parallel", "0.00012  # F; was 0.00015; two in parallel")
+            .replace(
+                "150e-6  # two in parallel",
+                "0.00012  # F; was 0.00015; two in parallel",
+            )
             .replace("dcr = 0.1", "dcr = 0.3  # ohm")
             .replace("\"centre\"\n", "\"leading\"  # 1\nsampling_phase = 0.25  # 1\n")
             + "\n[capacitor]\nesr = 0.05  # ohm\n";
@@ -122,7 +140,8 @@ mod tests {
 
     #[test]
     fn a_file_that_lines_do_not_tell_is_not_edited() {
-        let text = "converter = { kind = \"buck\", v_in = 200.0, inductance = 2e-3, capacitance = 150e-6, f_sw = 10e3 }\n";
+        let text =
+            "converter = { kind = \"buck\", v_in = 200.0, inductance = 2e-3, capacitance = 150e-6, f_sw = 10e3 }\n";
         if let Ok(before) = Parameters::from_toml(Path::new("a.toml"), text) {
             let mut after = before.clone();
             after.converter.capacitance = 120e-6;

@@ -2,10 +2,10 @@
 
 use plant::Parameters;
 
-use crate::exact::Exact;
 use super::{Driven, Estimates, around};
 use crate::capture::fold::INDEPENDENT;
 use crate::capture::{Capture, Fold, GAIN, Origin};
+use crate::exact::Exact;
 use crate::search::gained;
 
 /// `v = esr i + q / c` over the period: the ripple of the current is measured, or that of the model.

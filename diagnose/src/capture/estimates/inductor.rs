@@ -2,10 +2,10 @@
 
 use plant::Parameters;
 
-use crate::exact::Exact;
 use super::{Estimates, around};
 use crate::capture::fold::INDEPENDENT;
 use crate::capture::{Capture, GAIN, Level, Origin};
+use crate::exact::Exact;
 
 /// Part of an interval between edges over which a slope is fitted.
 const STRAIGHT: (f64, f64) = (0.12, 0.9);

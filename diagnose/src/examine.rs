@@ -72,7 +72,7 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
     unsure_levels::note(&mut problem, attribution.state());
     // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
-    let lines = fast::structures(&problem, &attribution.null, attribution.state());
+    let lines = beside(fast::structures(&problem, &attribution.null, attribution.state()), &structure);
     let mut profiles = held_by_data(&problem, &mut attribution, &structure, say);
     // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
@@ -131,7 +131,7 @@ impl Examined {
     fn answer(&mut self) {
         let (problem, attribution) = (&self.problem, &self.attribution);
         self.structure = structures(problem, &attribution.null, attribution.state(), attribution.inflation);
-        self.lines = fast::structures(problem, &attribution.null, attribution.state());
+        self.lines = beside(fast::structures(problem, &attribution.null, attribution.state()), &self.structure);
         self.named = named(attribution, &self.profiles);
         self.doubts = doubts::of(problem, attribution, &self.profiles, &self.structure);
         let holds = self.structure.is_empty() && !doubts::forbids(&self.named, &self.doubts);
@@ -154,6 +154,15 @@ impl Examined {
         }
         Some(pair)
     }
+}
+
+/// Lines in channels that hold nothing else: what is slow has been said already.
+fn beside(mut lines: Vec<Structure>, structure: &[Structure]) -> Vec<Structure> {
+    lines.retain(|line| {
+        let same = |one: &Structure| one.record == line.record && one.channel == line.channel;
+        !structure.iter().any(same)
+    });
+    lines
 }
 
 /// The held-out records with the model as given and with `state`, if there are any.

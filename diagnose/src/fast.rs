@@ -22,6 +22,8 @@ use crate::words::si;
 
 /// Lowest frequency, over the sampling rate: slower structure shows in means of ten rows (`shape`).
 const LOWEST: f64 = 0.04;
+/// And so many times what the filter rings at: a ring that ends is wide.
+const ABOVE_RING: f64 = 2.0;
 /// Chance that a channel of a healthy record shows a line. Four channels of a record are looked at, so that one in 500 records does.
 const CHANCE: f64 = 5e-4;
 /// Fewest rows: of fewer neither floor nor colour is known well enough to tell a line ten times as high.
@@ -53,6 +55,10 @@ pub struct Peak {
 #[must_use]
 pub fn structures(problem: &Problem, null: &State, state: &State) -> Vec<Structure> {
     let mut found = Vec::new();
+    let p = &problem.base.plant.converter;
+    // what the filter rings at is no line, however fast it is
+    let ring = problem.bases.t_sw / (TAU * (p.inductance * p.capacitance).sqrt());
+    let lowest = LOWEST.max(ABOVE_RING * ring);
     for (index, record) in problem.records.iter().enumerate() {
         if record.settled || !record.dense || record.capture.is_some() {
             continue;
@@ -66,7 +72,7 @@ pub fn structures(problem: &Problem, null: &State, state: &State) -> Vec<Structu
             if record.lattice[n] > 1.5 * problem.sigma[n] {
                 continue;
             }
-            let peaks = peaks(&left, &before);
+            let peaks = peaks(&left, &before, lowest);
             if peaks.is_empty() {
                 continue;
             }
@@ -125,7 +131,7 @@ fn words(peak: &Peak, rows: usize, rate: f64, sigma: f64, unit: &'static str) ->
 
 /// The lines of a course; a simulator that is off by its accuracy leaves that share of a line that was there `before`.
 #[must_use]
-pub fn peaks(values: &[f64], before: &[f64]) -> Vec<Peak> {
+pub fn peaks(values: &[f64], before: &[f64], lowest: f64) -> Vec<Peak> {
     let known = values.iter().filter(|v| **v != 0.0).count();
     if known < FEWEST || 2 * known < values.len() {
         return Vec::new();
@@ -139,7 +145,7 @@ pub fn peaks(values: &[f64], before: &[f64]) -> Vec<Peak> {
     let colour = colour(&raw, (fine, wide));
     let power: Vec<f64> = raw.iter().zip(&colour).map(|(power, of)| power / of).collect();
     let was = periodogram(before, known);
-    let lowest = (LOWEST * 2.0 * bins as f64).ceil() as usize;
+    let lowest = (lowest * 2.0 * bins as f64).ceil() as usize;
     let mut list: Vec<Peak> = Vec::new();
     let mut places: Vec<usize> = (lowest..=bins).collect();
     places.sort_by(|a, b| power[*b].total_cmp(&power[*a]).then(a.cmp(b)));
@@ -297,7 +303,7 @@ fn transform(re: &mut [f64], im: &mut [f64]) {
 mod tests {
     use std::f64::consts::TAU;
 
-    use super::{peaks, transform};
+    use super::{LOWEST, peaks, transform};
 
     /// Twelve uniform numbers of a linear congruential generator make a normal one.
     struct Noise(u64);
@@ -355,7 +361,7 @@ mod tests {
                     for _ in 0..12 {
                         let values = noise.course(rows, colour, kind);
                         all += 1;
-                        if let Some(peak) = peaks(&values, &values).first() {
+                        if let Some(peak) = peaks(&values, &values, LOWEST).first() {
                             alarms.push((rows, colour, kind, *peak));
                         }
                     }
@@ -392,7 +398,7 @@ mod tests {
                             *value += size * (angle * n as f64 + phase).sin();
                         }
                         all += 1;
-                        let found = peaks(&values, &[0.0].repeat(rows));
+                        let found = peaks(&values, &[0.0].repeat(rows), LOWEST);
                         let hit = found.iter().any(|peak| {
                             (peak.frequency - f).abs() * (rows as f64) < 1.0
                                 && (peak.amplitude / size - 1.0).abs() < 0.5

@@ -72,7 +72,10 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
     unsure_levels::note(&mut problem, attribution.state());
     // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
-    let lines = beside(fast::structures(&problem, &attribution.null, attribution.state()), &structure);
+    let lines = beside(
+        fast::structures(&problem, &attribution.null, attribution.state()),
+        &structure,
+    );
     let mut profiles = held_by_data(&problem, &mut attribution, &structure, say);
     // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
@@ -131,7 +134,10 @@ impl Examined {
     fn answer(&mut self) {
         let (problem, attribution) = (&self.problem, &self.attribution);
         self.structure = structures(problem, &attribution.null, attribution.state(), attribution.inflation);
-        self.lines = beside(fast::structures(problem, &attribution.null, attribution.state()), &self.structure);
+        self.lines = beside(
+            fast::structures(problem, &attribution.null, attribution.state()),
+            &self.structure,
+        );
         self.named = named(attribution, &self.profiles);
         self.doubts = doubts::of(problem, attribution, &self.profiles, &self.structure);
         let holds = self.structure.is_empty() && !doubts::forbids(&self.named, &self.doubts);

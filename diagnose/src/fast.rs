@@ -133,7 +133,8 @@ fn words(peak: &Peak, rows: usize, rate: f64, sigma: f64, unit: &'static str) ->
 #[must_use]
 pub fn peaks(values: &[f64], before: &[f64], lowest: f64) -> Vec<Peak> {
     let known = values.iter().filter(|v| **v != 0.0).count();
-    if known < FEWEST || 2 * known < values.len() {
+    // the first row of a stretch never counts, and a step leaves out a row or two
+    if values.len() < FEWEST || 2 * known < values.len() {
         return Vec::new();
     }
     let raw = periodogram(values, known);

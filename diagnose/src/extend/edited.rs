@@ -138,8 +138,7 @@ mod tests {
 
     #[test]
     fn a_file_that_lines_do_not_tell_is_not_edited() {
-        let text =
-            "converter = { v_in = 200.0, inductance = 2e-3, capacitance = 150e-6, f_sw = 10e3 }\n";
+        let text = "converter = { v_in = 200.0, inductance = 2e-3, capacitance = 150e-6, f_sw = 10e3 }\n";
         let before = Parameters::from_toml(Path::new("a.toml"), text).unwrap();
         let mut after = before.clone();
         after.converter.capacitance = 120e-6;

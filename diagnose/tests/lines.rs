@@ -90,11 +90,12 @@ fn what_a_wrong_circuit_leaves_is_no_line() {
     assert!(alarms <= 1, "{alarms} of 40");
 }
 
-/// Patterns, each with the amplitude of its line in the current that a duty of 1 makes, A: 10 A a period at 200 V, 2 mH and 10 kHz, a triangle of
-/// two periods to either side, a zigzag of one, and a course over five.
+/// Patterns, each with the amplitude of its line in the current that a duty of 1 makes, A. A duty of 1 adds 10 A a period at 200 V, 2 mH and 10
+/// kHz. From middle to middle of two periods half of each is added: 5 cot(w / 2) times the amplitude of the pattern's own line, which is
+/// 1.414 and 1.231. From start to start a zigzag goes 5 A to either side.
 const QUARTER: (&[f64], f64) = (&[1.0, 1.0, -1.0, -1.0], 7.07);
 const HALF: (&[f64], f64) = (&[1.0, -1.0], 5.0);
-const FIFTH: (&[f64], f64) = (&[1.0, 1.0, 0.0, -1.0, -1.0], 13.0);
+const FIFTH: (&[f64], f64) = (&[1.0, 1.0, 0.0, -1.0, -1.0], 8.47);
 /// Amplitude of the noise's own line in n rows, times their root: 0.05 A on two sides of the spectrum, or on the one at half the rate.
 const NOISE_LINE: f64 = 0.1;
 

@@ -49,12 +49,13 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
     if crate::balance::broken(&problem).is_some() {
         // no cause mends them: a search would take its longest and find nothing
         let unmoved = (0..candidates.len()).map(|cause| search.fitter.unmoved(cause, 0.0));
-        let attribution = grown(&search, unmoved.collect(), None);
+        let attribution = completed(&search, unmoved.collect(), (None, Vec::new()));
         return (problem, attribution);
     }
     let singles = search.singles("each cause alone");
     let Some((freed, near)) = needs_instants(&search, &singles) else {
-        let attribution = grown(&search, singles, None);
+        let found = search.grow(&singles);
+        let attribution = completed(&search, singles, found);
         return (problem, attribution);
     };
     say(Progress::Stage("load steps inside a period"));
@@ -74,18 +75,21 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
             free_singles[place] = fit;
         }
     }
-    let found = grown(&free, free_singles, None);
-    // two causes together may have looked like instants, as long as one of them was missing
-    let as_listed = found.best.as_ref().map(|best| search.refitted(best));
-    match (as_listed, &found.best) {
+    let found = free.grow(&free_singles);
+    // two causes together may have looked like instants, as long as one of them was missing; rivals take the longest, and are sought once
+    let as_listed = found.0.as_ref().map(|best| search.refitted(best));
+    match (as_listed, &found.0) {
         (Some(listed), Some(best))
             if instants::chi2(&freed, &listed.state.residual)
-                < best.state.chi2 + threshold(instants::count(&freed), found.inflation) =>
+                < best.state.chi2 + threshold(instants::count(&freed), free.inflation(best)) =>
         {
-            let attribution = grown(&search, singles, Some(listed));
+            let attribution = completed(&search, singles, search.backward(listed));
             (problem, attribution)
         }
-        _ => (freed, found),
+        _ => {
+            let attribution = completed(&free, free_singles, found);
+            (freed, attribution)
+        }
     }
 }
 
@@ -125,13 +129,9 @@ fn needs_instants(search: &Searcher<'_>, singles: &[Fit]) -> Option<(Problem, St
     is_as_good.then_some((freed, inside))
 }
 
-/// The causes that `search` finds, or what is left of those that are `known`, with all that goes with them.
-fn grown(search: &Searcher<'_>, singles: Vec<Fit>, known: Option<Fit>) -> Attribution {
+/// The causes that `search` has found, and the evidence of each, with all that goes with them.
+fn completed(search: &Searcher<'_>, singles: Vec<Fit>, (best, evidence): (Option<Fit>, Vec<f64>)) -> Attribution {
     let (problem, null) = (search.fitter.problem, search.fitter.null);
-    let (best, evidence) = match known {
-        Some(fit) => search.backward(fit),
-        None => search.grow(&singles),
-    };
     let inflation = match &best {
         Some(fit) => search.inflation(fit),
         None => noise::inflation(problem, &null.residual),

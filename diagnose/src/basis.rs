@@ -217,6 +217,16 @@ impl Across {
 }
 
 impl Basis {
+    /// Standard deviation of the trim, all else following, 1; nothing where it is held.
+    #[must_use]
+    pub fn trim_sd(&self) -> Option<f64> {
+        let trim = self
+            .across
+            .iter()
+            .find(|across| matches!(across.unknown, Unknown::Trim))?;
+        Some(1.0 / dot(&trim.own, &trim.own).sqrt())
+    }
+
     /// Takes out of `u` what initial states explain.
     pub fn project(&self, u: &mut [f64]) {
         for span in &self.spans {

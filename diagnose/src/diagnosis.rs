@@ -1,6 +1,7 @@
 //! From records to a verdict.
 
 use plant::Parameters;
+use toml_input::FileName;
 
 use crate::aside;
 use crate::attribute::Attribution;
@@ -24,6 +25,7 @@ use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
+use crate::whiteness;
 use crate::words::{nearest, other_carrier as other_carrier_said, sentence, shifted, si};
 use crate::worth::{self, Worth};
 
@@ -46,6 +48,8 @@ pub struct Diagnosis {
     pub extended: Model,
     /// Duty that its edges add, 1.
     pub trim: f64,
+    /// The text of the model's file, if its order and comments are to stay in what is written.
+    pub model_text: Option<String>,
     /// A term that describes what no cause explains; `extended` has it if it is written.
     pub empirical: Option<Described>,
     /// The loop closed with a policy, if one was given.
@@ -108,14 +112,15 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         compared,
         verdict: match set_aside {
             Some(_) => Verdict::MostlyExplained,
-            None => found.verdict,
+            None => found.verdict_with_lines(),
         },
         partial: if explained { Vec::new() } else { found.named.clone() },
         causes: answer.causes,
         partial_gain: answer.partial_gain,
         set_aside,
         empirical: empirical.as_ref().map(|term| term.findings.clone()),
-        structure: found.structure.clone(),
+        structure: found.structure.iter().chain(&found.lines).cloned().collect(),
+        residuals: whiteness::of(&found.problem, &found.attribution.null, found.attribution.state()),
         doubts: doubts::said(&found.doubts),
         not_detectable: answer.not_detectable,
         next_experiments: answer.next_experiments,
@@ -135,6 +140,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         profiles: found.profiles,
         held: pair,
         trim,
+        model_text: None,
         empirical,
         control: None,
     }
@@ -147,9 +153,22 @@ fn better(found: &Examined, f_sw: f64) -> (State, f64) {
         _ => {
             let state = found.attribution.state().clone();
             let trim = state.starts.trim_or_none(f_sw);
-            (state, trim)
+            (
+                state,
+                if is_resolved(&found.attribution, trim) {
+                    trim
+                } else {
+                    0.0
+                },
+            )
         }
     }
+}
+
+/// Whether the records tell a trim of the edges from none: two standard deviations.
+fn is_resolved(attribution: &Attribution, trim: f64) -> bool {
+    let sd = attribution.basis.trim_sd().unwrap_or(f64::INFINITY);
+    trim.abs() > 2.0 * sd * attribution.inflation.sqrt()
 }
 
 /// The records that judge, and what is said of captures among them.
@@ -250,7 +269,16 @@ fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<Str
     }
 }
 
+/// Largest plant file whose text is kept, bytes: a hundred times a long one.
+const LONGEST_FILE: u64 = 1 << 20;
+
 impl Diagnosis {
+    /// Keeps the text of the model's file, so that its order and comments stay in what is written.
+    pub fn keep_text(&mut self, file: &FileName) {
+        let bytes = file.read(LONGEST_FILE).ok();
+        self.model_text = bytes.and_then(|bytes| String::from_utf8(bytes).ok());
+    }
+
     /// Closes the loop with a policy on the extended model; without load steps asked for, over the records' loads. Where
     /// that cannot be done the reason is noted, and the diagnosis stands.
     pub fn close_the_loop(&mut self, mut request: Request) {

@@ -3,6 +3,7 @@
 use crate::attribute::{Attribution, attribute};
 use crate::doubts::{self, Doubt};
 use crate::drive::Model;
+use crate::fast;
 use crate::findings::{Evidence, Named, Value, Verdict};
 use crate::fit::State;
 use crate::gain::{self, Pair};
@@ -37,6 +38,8 @@ pub struct Examined {
     pub read_off: Vec<Named>,
     /// What is left.
     pub structure: Vec<Structure>,
+    /// Lines too fast for any cause, which stand beside what was found.
+    pub lines: Vec<Structure>,
     /// What speaks against the causes.
     pub doubts: Vec<Doubt>,
     /// Rows left out.
@@ -69,6 +72,10 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
     unsure_levels::note(&mut problem, attribution.state());
     // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
+    let lines = beside(
+        fast::structures(&problem, &attribution.null, attribution.state()),
+        &structure,
+    );
     let mut profiles = held_by_data(&problem, &mut attribution, &structure, say);
     // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
@@ -85,6 +92,7 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
         named,
         read_off,
         structure,
+        lines,
         doubts,
         outliers,
         odd,
@@ -92,6 +100,16 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
 }
 
 impl Examined {
+    /// The verdict with lines that no cause makes: beside causes they are left, and without causes they are all that there is.
+    #[must_use]
+    pub fn verdict_with_lines(&self) -> Verdict {
+        match self.verdict {
+            verdict if self.lines.is_empty() => verdict,
+            Verdict::Explained | Verdict::Ambiguous | Verdict::MostlyExplained => Verdict::MostlyExplained,
+            Verdict::Consistent | Verdict::Unexplained => Verdict::Unexplained,
+        }
+    }
+
     /// Takes over what was read off more of the same records before.
     pub fn read_before(&mut self, whole: &Examined) {
         let is_new = |cause: &&Named| self.read_off.iter().all(|known| known.id != cause.id);
@@ -116,6 +134,10 @@ impl Examined {
     fn answer(&mut self) {
         let (problem, attribution) = (&self.problem, &self.attribution);
         self.structure = structures(problem, &attribution.null, attribution.state(), attribution.inflation);
+        self.lines = beside(
+            fast::structures(problem, &attribution.null, attribution.state()),
+            &self.structure,
+        );
         self.named = named(attribution, &self.profiles);
         self.doubts = doubts::of(problem, attribution, &self.profiles, &self.structure);
         let holds = self.structure.is_empty() && !doubts::forbids(&self.named, &self.doubts);
@@ -138,6 +160,15 @@ impl Examined {
         }
         Some(pair)
     }
+}
+
+/// Lines in channels that hold nothing else: what is slow has been said already.
+fn beside(mut lines: Vec<Structure>, structure: &[Structure]) -> Vec<Structure> {
+    lines.retain(|line| {
+        let same = |one: &Structure| one.record == line.record && one.channel == line.channel;
+        !structure.iter().any(same)
+    });
+    lines
 }
 
 /// The held-out records with the model as given and with `state`, if there are any.

@@ -1,5 +1,7 @@
 //! The extended model as a plant file.
 
+mod edited;
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -104,10 +106,49 @@ pub fn partial_toml(diagnosis: &Diagnosis) -> Option<String> {
     Some(written(diagnosis, text, &as_plant(&state.model, trim), trim))
 }
 
-/// A plant file below the comment `text`.
+/// A plant file below the comment `text`: that of the user with its order and comments, where it is known.
 fn written(diagnosis: &Diagnosis, mut text: String, after: &Parameters, trim: f64) -> String {
     let before = &diagnosis.given.model.plant;
-    let mut notes: BTreeMap<&str, String> = BTreeMap::new();
+    if trim != 0.0 {
+        let _ = writeln!(
+            text,
+            "# The switch's delays hold {:.1} ns of duty that the gate's edges seem to add; not a cause.",
+            1e9 * trim * before.t_sw()
+        );
+    }
+    let notes = notes(diagnosis, after, trim);
+    let own = diagnosis.model_text.as_deref();
+    if let Some(edited) = own.and_then(|own| edited::edited(own, before, after, &notes)) {
+        return format!("{text}\n{edited}");
+    }
+    let mut tables: BTreeMap<&str, String> = BTreeMap::new();
+    for parameter in plant::parameters() {
+        let (was, is) = (parameter.get(before), parameter.get(after));
+        let needed = plant::REQUIRED.contains(&parameter.key);
+        // a number that came back to neutral is written all the same: a reader looks for what has changed
+        if is == parameter.neutral && !needed && was == is {
+            continue;
+        }
+        let Some((table, key)) = parameter.key.rsplit_once('.') else {
+            continue;
+        };
+        let value = edited::value(parameter, is);
+        let note = match notes.get(parameter.key) {
+            Some(note) => format!("  # {note}"),
+            None if parameter.is_pure() => String::new(),
+            None => format!("  # {}", parameter.unit),
+        };
+        let _ = writeln!(tables.entry(table).or_default(), "{key} = {value}{note}");
+    }
+    for (table, lines) in tables {
+        let _ = write!(text, "\n[{table}]\n{lines}");
+    }
+    text
+}
+
+/// What is said of each number that has changed: its unit, its interval, and what it was.
+fn notes(diagnosis: &Diagnosis, after: &Parameters, trim: f64) -> BTreeMap<&'static str, String> {
+    let mut intervals: BTreeMap<&str, String> = BTreeMap::new();
     let best = diagnosis
         .attribution
         .best
@@ -122,55 +163,27 @@ fn written(diagnosis: &Diagnosis, mut text: String, after: &Parameters, trim: f6
         {
             for key in knob.keys {
                 let [low, high] = profile.interval;
-                notes.insert(key, format!("95 %: {low:.5e} to {high:.5e}; "));
+                intervals.insert(key, format!("95 %: {low:.5e} to {high:.5e}; "));
             }
         }
     }
-    if trim != 0.0 {
-        let _ = writeln!(
-            text,
-            "# The switch's delays hold {:.1} ns of duty that the gate's edges seem to add; not a cause.",
-            1e9 * trim * before.t_sw()
+    let mut notes = BTreeMap::new();
+    for parameter in plant::parameters() {
+        let (was, is) = (parameter.get(&diagnosis.given.model.plant), parameter.get(after));
+        if was == is {
+            continue;
+        }
+        let interval = intervals.get(parameter.key).map_or("", String::as_str);
+        // a reader who looks for what was found must not take these for it
+        let beside = match trim != 0.0 && EDGES.contains(&parameter.key) {
+            true => "edges of the gate, fitted beside every cause and none itself; ",
+            false => "",
+        };
+        let was = edited::value(parameter, was);
+        notes.insert(
+            parameter.key,
+            format!("{}; {interval}{beside}was {was}", parameter.unit),
         );
     }
-    let mut tables: BTreeMap<&str, String> = BTreeMap::new();
-    for parameter in plant::parameters() {
-        let (was, is) = (parameter.get(before), parameter.get(after));
-        let needed = plant::REQUIRED.contains(&parameter.key);
-        // a number that came back to neutral is written all the same: a reader looks for what has changed
-        if is == parameter.neutral && !needed && was == is {
-            continue;
-        }
-        let Some((table, key)) = parameter.key.rsplit_once('.') else {
-            continue;
-        };
-        let value = match parameter.choices().get(is as usize) {
-            Some(word) => format!("\"{word}\""),
-            None if parameter.is_whole() => format!("{}", is as u64),
-            // `{:?}`, because `{}` writes 1 for 1.0, which is an integer in TOML
-            None => format!("{is:?}"),
-        };
-        let unit = if parameter.is_pure() {
-            String::new()
-        } else {
-            format!("  # {}", parameter.unit)
-        };
-        let note = match was == is {
-            true => unit,
-            false => {
-                let interval = notes.get(parameter.key).map_or("", String::as_str);
-                // a reader who looks for what was found must not take these for it
-                let beside = match trim != 0.0 && EDGES.contains(&parameter.key) {
-                    true => "edges of the gate, fitted beside every cause and none itself; ",
-                    false => "",
-                };
-                format!("  # {}; {interval}{beside}was {was:?}", parameter.unit)
-            }
-        };
-        let _ = writeln!(tables.entry(table).or_default(), "{key} = {value}{note}");
-    }
-    for (table, lines) in tables {
-        let _ = write!(text, "\n[{table}]\n{lines}");
-    }
-    text
+    notes
 }

@@ -9,6 +9,7 @@ use crate::compared::Compared;
 use crate::gain::{Held, Shift};
 use crate::rivals::RivalValue;
 use crate::shape::Structure;
+use crate::whiteness::Whiteness;
 use crate::worth::Worth;
 
 /// The answer in a word.
@@ -168,6 +169,8 @@ pub struct Findings {
     pub empirical: Option<crate::empirical::Empirical>,
     /// Structure that is left.
     pub structure: Vec<Structure>,
+    /// How well each channel of the training records is fitted, and whether the rest is noise.
+    pub residuals: Vec<Whiteness>,
     /// Why causes are no explanation although they leave no structure, in words.
     pub doubts: Vec<String>,
     /// Causes that would have to be large to be seen.

@@ -220,7 +220,12 @@ impl Fitter<'_> {
             return fit;
         }
         // initial states ring as the filter does: where the fit has moved its frequency, what they explain is something else by now
-        let State { model, starts, residual, chi2 } = &fit.state;
+        let State {
+            model,
+            starts,
+            residual,
+            chi2,
+        } = &fit.state;
         let own = self.problem.basis(model, starts, residual);
         let settled = State::settle_in(self.problem, model, starts, Some(&own), 2);
         if settled.chi2 > RUN_AWAY * chi2 {

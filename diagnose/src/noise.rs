@@ -1,5 +1,6 @@
 //! Noise of each channel, outliers, and what is left in a residual that noise would not leave.
 
+use crate::exact::Exact;
 use crate::median::median;
 use crate::problem::{Problem, dot};
 use crate::record::{CHANNELS, Record};
@@ -63,7 +64,7 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             (true, true) => (typical * problem.sigma[n])
                 .min(most(problem, n, scale))
                 .max(least)
-                .hypot(metered(problem, n)),
+                .hypotenuse(metered(problem, n)),
             // too few points to tell noise from anything: a share of what is measured, that of a good meter
             (true, false) => 2e-3 * scale,
         }

@@ -2,6 +2,7 @@
 
 use crate::attribute::Attribution;
 use crate::causes::Search;
+use crate::exact::Exact;
 use crate::level::ACCURACY;
 use crate::problem::Problem;
 use crate::progress::{self, Listener};
@@ -128,7 +129,7 @@ pub fn profiles(problem: &Problem, attribution: &Attribution, say: Listener<'_>)
                 _ => statistical,
             };
             // noise and the simulator's error have nothing to do with each other: they add in squares
-            let reach = at.signum() * statistical.hypot(systematic);
+            let reach = at.signum() * statistical.hypotenuse(systematic);
             profile.interval[side] = (value + reach).clamp(low, high);
         }
         profile.curve.sort_by(|a, b| a.0.total_cmp(&b.0));

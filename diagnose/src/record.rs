@@ -22,8 +22,8 @@ use toml_input::{Faults, FileName, Message, Sink};
 
 pub use channels::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Segment};
 use channels::{FEWEST, QUANTITIES};
-use raw::Raw;
 pub use levels::{Level, Part};
+use raw::Raw;
 pub(crate) use source::Source;
 pub use together::open_all;
 pub use unread::{Unread, quantity};

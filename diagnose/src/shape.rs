@@ -5,9 +5,10 @@ use crate::fit::State;
 use crate::level::ACCURACY;
 use crate::noise::{self, BLOCK, channel};
 use crate::problem::Problem;
-use crate::record::{CHANNEL_NAMES, Record};
+use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, Record};
 use crate::small;
 use crate::spectrum::strongest_line;
+use crate::words::si;
 
 /// Structure is seen where block means scatter this much more than white noise of the same size would let them: twice as much,
 /// however many blocks there are. Real noise is never quite white; a convention.
@@ -85,7 +86,6 @@ pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64
 
 fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &[f64], is_slow: bool) -> String {
     let total: f64 = values.iter().map(|v| v * v).sum();
-    let sigma = problem.sigma[n];
     if let Some((row, share)) = burst(values, total) {
         let t = problem.records[index].time[row];
         return format!("a burst around t = {t:.4} s ({:.0} % of the power)", 100.0 * share);
@@ -99,28 +99,20 @@ fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &
             100.0 * line.share
         );
     }
-    let (at, step) = largest_step(values);
-    let t = problem.records[index].time[at];
-    let row: Vec<f64> = (0..values.len()).map(|n| n as f64).collect();
-    let trend = of_means(values, &row);
-    // the limits below choose words only
-    if trend.abs() > ALIKE {
-        return format!("a drift over the record (correlation with time {trend:.2})");
-    }
-    if step.abs() > 0.5 {
-        return format!("a step of {:.3} at t = {t:.4} s", step * sigma);
-    }
     if !is_slow {
         return "fast, without a line that stands out".to_owned();
     }
-    followed(&problem.records[index], values, trend)
+    followed(problem, (index, n), values)
 }
 
 /// Correlation from which on one course follows another: a third of the one's square comes from the other.
 const ALIKE: f64 = 0.6;
+/// Shares of the square in which two courses are alike: the one that stands first in the list is taken. A convention.
+const AS_WELL: f64 = 0.05;
 
-/// What a slow residual goes along with: the duty, the load, or nothing of these.
-fn followed(record: &Record, values: &[f64], trend: f64) -> String {
+/// What a slow residual goes along with, the one that explains most of its means; one step or none of these.
+fn followed(problem: &Problem, (index, n): (usize, usize), values: &[f64]) -> String {
+    let record = &problem.records[index];
     let load = record.load.iter().zip(&record.measured[0]);
     // where no voltage was measured the current that was set is all that is known
     let load: Vec<f64> = load
@@ -129,14 +121,45 @@ fn followed(record: &Record, values: &[f64], trend: f64) -> String {
             false => load.current,
         })
         .collect();
-    let [duty, load] = [&record.duty, &load].map(|course| of_means(values, course));
-    match duty.abs() >= load.abs() {
-        true if duty.abs() > ALIKE => format!("slow, following the duty (correlation {duty:.2})"),
-        false if load.abs() > ALIKE => format!("slow, following the load current (correlation {load:.2})"),
-        _ => format!(
-            "slow, following neither duty nor load nor time alone (correlations {duty:.2}, {load:.2}, {trend:.2})"
+    let row: Vec<f64> = (0..values.len()).map(|n| n as f64).collect();
+    let current: Vec<f64> = record.measured[1]
+        .iter()
+        .map(|i| if i.is_finite() { *i } else { 0.0 })
+        .collect();
+    let rests: Vec<f64> = (0..record.rows())
+        .map(|row| f64::from(u8::from(is_at_rest(problem, record, row))))
+        .collect();
+    let courses: [(&[f64], &str); 5] = [
+        (&rests, "slow, where the current rests in each period (DCM)"),
+        (&load, "slow, following the load current"),
+        (&record.duty, "slow, following the duty"),
+        (&current, "slow, following the inductor current"),
+        (&row, "a drift over the record"),
+    ];
+    let all = courses.map(|(course, words)| (of_means(values, course), words));
+    let (at, step, share) = largest_step(values);
+    let most = all.iter().map(|(r, _)| r * r).fold(share, f64::max);
+    if most < ALIKE * ALIKE {
+        let [_, load, duty, _, time] = all.map(|(r, _)| r);
+        return format!(
+            "slow, following neither duty nor load nor time alone (correlations {duty:.2}, {load:.2}, {time:.2})"
+        );
+    }
+    match all.iter().find(|(r, _)| r * r > most - AS_WELL) {
+        Some((r, words)) => format!("{words} (correlation {r:.2})"),
+        None => format!(
+            "a step of {} at t = {:.4} s",
+            si(step * problem.sigma[n], CHANNEL_UNITS[n]),
+            record.time[at]
         ),
     }
+}
+
+/// Whether the inductor current rests within the period of a row.
+fn is_at_rest(problem: &Problem, record: &Record, row: usize) -> bool {
+    let p = &problem.base.plant.converter;
+    let v = record.duty[row] * p.v_in * record.v_in_ratio;
+    noise::is_discontinuous(record, row, v, v * (1.0 - record.duty[row]) / (p.inductance * p.f_sw))
 }
 
 /// Twenty neighbouring rows that hold most of the power.
@@ -151,22 +174,32 @@ fn burst(values: &[f64], total: f64) -> Option<(usize, f64)> {
     (most > 0.5 * total).then_some((row + BLOCK, most / total))
 }
 
-/// Where the mean before and after differ most, and by how much.
-fn largest_step(values: &[f64]) -> (usize, f64) {
-    let n = values.len();
-    let mut best = (0, 0.0f64, 0.0f64);
-    let total: f64 = values.iter().sum();
+/// Where the mean before and after differ most, by how much, and the share of the square of the means that this makes.
+fn largest_step(values: &[f64]) -> (usize, f64, f64) {
+    let means: Vec<f64> = values
+        .chunks(BLOCK)
+        .map(|block| block.iter().sum::<f64>() / block.len() as f64)
+        .collect();
+    let n = means.len();
+    let mean = means.iter().sum::<f64>() / n.max(1) as f64;
+    let square: f64 = means.iter().map(|v| (v - mean) * (v - mean)).sum();
+    let mut best = (0, 0.0, 0.0f64);
+    let total: f64 = means.iter().sum();
     let mut before = 0.0;
     for at in 1..n {
-        before += values[at - 1];
+        before += means[at - 1];
         let (a, b) = (at as f64, (n - at) as f64);
         let step = (total - before) / b - before / a;
         let weight = step * step * a * b / n as f64;
         if weight > best.2 {
-            best = (at, step, weight);
+            best = (at * BLOCK, step, weight);
         }
     }
-    (best.0, best.1)
+    (
+        best.0.min(values.len().saturating_sub(1)),
+        best.1,
+        best.2 / square.max(f64::MIN_POSITIVE),
+    )
 }
 
 /// Correlation of block means, in which white noise weighs little.

@@ -107,7 +107,11 @@ pub fn of(problem: &Problem, null: &State) -> Option<Timing> {
             "the inductor current is off as if the carrier of the bench were `{word}` and not `{own_word}`: with it {left:.0} % of that error are \
              left. `carrier = \"{word}\"` is taken; if it is right, write it under [pwm] of the plant file"
         );
-        return Some(Timing::Other(named(null, carrier, (own.raw - other.raw) / inflation), carrier, said));
+        return Some(Timing::Other(
+            named(null, carrier, (own.raw - other.raw) / inflation),
+            carrier,
+            said,
+        ));
     }
     (other.raw < single + TIE * inflation).then(|| {
         Timing::Perhaps(format!(

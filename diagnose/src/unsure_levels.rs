@@ -18,7 +18,12 @@ const LOAD_CURRENT: usize = 2;
 
 /// Frees the levels whose uncertainty shows in the records; whether there are any. `null` then has to be settled again.
 pub(crate) fn free(problem: &mut Problem, model: &Model, null: &mut State) -> bool {
-    let most = problem.records.iter().map(|record| record.levels.len()).max().unwrap_or(0);
+    let most = problem
+        .records
+        .iter()
+        .map(|record| record.levels.len())
+        .max()
+        .unwrap_or(0);
     if most == 0 {
         return false;
     }
@@ -44,7 +49,10 @@ pub(crate) fn free(problem: &mut Problem, model: &Model, null: &mut State) -> bo
     let free: Vec<Vec<_>> = (0..problem.records.len())
         .map(|record| {
             let levels = problem.records[record].levels.iter().enumerate();
-            levels.filter(|(n, _)| shows(record, *n)).map(|(_, level)| level.clone()).collect()
+            levels
+                .filter(|(n, _)| shows(record, *n))
+                .map(|(_, level)| level.clone())
+                .collect()
         })
         .collect();
     for (record, levels) in problem.records.iter_mut().zip(free) {

@@ -13,16 +13,27 @@ const MOST_SAID: usize = 3;
 
 /// The verdict in a sentence; `aside` was left out of what was `found`, whose structure then is what it leaves there.
 pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>) -> String {
+    let lines = shapes(&found.lines);
+    let beside = match found.lines.is_empty() {
+        true => String::new(),
+        false => format!(
+            " Beside it there is {lines}. No cause of the list makes that, and what was found does not hang on it."
+        ),
+    };
     match found.verdict {
         Verdict::Unexplained => {
-            let left = match found.structure.is_empty() {
+            let all: Vec<Structure> = found.structure.iter().chain(&found.lines).cloned().collect();
+            let left = match all.is_empty() {
                 true => String::new(),
-                false => format!("; left is {}", shapes(&found.structure)),
+                false => format!("; left is {}", shapes(&all)),
             };
             let doubts: String = (doubts::said(&found.doubts).iter())
                 .map(|doubt| format!("; {doubt}"))
                 .collect();
             format!("None of the known causes explains the records{left}{doubts}.")
+        }
+        Verdict::Consistent if !found.lines.is_empty() => {
+            format!("The model explains the records but for {lines}. No cause of the list makes that.")
         }
         Verdict::Consistent => "The model explains the records within their noise: nothing to correct.".to_owned(),
         Verdict::Explained | Verdict::Ambiguous | Verdict::MostlyExplained => {
@@ -30,8 +41,8 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>) -> St
             let ties: Vec<String> = ties.map(|cause| tie(cause, causes)).collect();
             let (list, ties) = (values(causes), ties.join(" "));
             match aside {
-                None if ties.is_empty() => format!("What the model gets wrong is {list}."),
-                None => format!("More than one explanation fits. One is {list}. {ties}"),
+                None if ties.is_empty() => format!("What the model gets wrong is {list}.{beside}"),
+                None => format!("More than one explanation fits. One is {list}. {ties}{beside}"),
                 Some(aside) => {
                     let what = match aside.channel {
                         Some(channel) => channel.to_owned(),
@@ -45,7 +56,7 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>) -> St
                         true => format!("this is explained: what the model gets wrong is {list}."),
                         false => format!("more than one explanation fits. One is {list}. {ties}"),
                     };
-                    format!("Without {what} {said} No known cause explains {what}{left}.")
+                    format!("Without {what} {said} No known cause explains {what}{left}.{beside}")
                 }
             }
         }
@@ -98,7 +109,10 @@ pub fn told(id: &str, value: f64, of: &'static str) -> String {
 pub fn other_carrier(found: &Examined) -> String {
     let carrier = found.read_off.iter().find(|cause| cause.id == timing::ID);
     carrier.map_or_else(String::new, |cause| {
-        format!(" That is so with the carrier that the current shows, {}, too.", values(std::slice::from_ref(cause)))
+        format!(
+            " That is so with the carrier that the current shows, {}, too.",
+            values(std::slice::from_ref(cause))
+        )
     })
 }
 

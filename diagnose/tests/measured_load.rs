@@ -81,9 +81,21 @@ fn light() -> Bench {
 #[test]
 fn a_level_of_a_noisy_meter_is_uncertain_while_the_current_rests() {
     for (noise, seed) in [(0.03, 3), (0.05, 5), (0.05, 6), (0.1, 7), (0.1, 8)] {
-        let found = diagnose(&model(), vec![record(&light(), noise, seed)], &[record(&light(), noise, seed + 10)], &|_| ());
-        println!("{noise} {seed}: {:?} {}\n{:#?}", found.findings.verdict, found.findings.sentence, found.findings.noise);
-        assert_eq!(found.findings.verdict, Verdict::Consistent, "noise {noise} A, seed {seed}");
+        let found = diagnose(
+            &model(),
+            vec![record(&light(), noise, seed)],
+            &[record(&light(), noise, seed + 10)],
+            &|_| (),
+        );
+        println!(
+            "{noise} {seed}: {:?} {}\n{:#?}",
+            found.findings.verdict, found.findings.sentence, found.findings.noise
+        );
+        assert_eq!(
+            found.findings.verdict,
+            Verdict::Consistent,
+            "noise {noise} A, seed {seed}"
+        );
     }
 }
 
@@ -93,7 +105,12 @@ fn a_capacitor_that_lost_a_fifth_is_found_while_the_current_rests() {
         capacitance: 120e-6,
         ..light()
     };
-    let found = diagnose(&model(), vec![record(&bench, 0.05, 3)], &[record(&bench, 0.05, 4)], &|_| ());
+    let found = diagnose(
+        &model(),
+        vec![record(&bench, 0.05, 3)],
+        &[record(&bench, 0.05, 4)],
+        &|_| (),
+    );
     let c = leading(&found, "c_wrong");
     assert!((c / 120e-6 - 1.0).abs() < 0.02, "{c}");
 }

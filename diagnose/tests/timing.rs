@@ -41,7 +41,12 @@ fn diagnosed(bench: &Bench, plant: &Parameters, seed: u64) -> Diagnosis {
     let random = &mut Noise(seed);
     let [train, held] = ["train", "held"].map(|name| stepped(bench, random).read(name, plant).unwrap());
     let found = diagnose(plant, vec![train], &[held], &|_| ());
-    println!("{:?}: {}\n{}\n", found.findings.verdict, found.findings.sentence, found.findings.noise.repairs.join("\n"));
+    println!(
+        "{:?}: {}\n{}\n",
+        found.findings.verdict,
+        found.findings.sentence,
+        found.findings.noise.repairs.join("\n")
+    );
     found
 }
 
@@ -61,8 +66,15 @@ fn another_carrier_is_a_cause_and_stands_in_the_extended_plant() {
     let found = diagnosed(&bench, &carrier(Carrier::Centre, 0.5), 5);
     let findings = &found.findings;
     assert_eq!(findings.verdict, Verdict::Explained);
-    assert_eq!(findings.causes.iter().map(|cause| cause.id).collect::<Vec<_>>(), ["carrier"]);
-    assert!(findings.sentence.contains("[carrier]: leading (model centre)"), "{}", findings.sentence);
+    assert_eq!(
+        findings.causes.iter().map(|cause| cause.id).collect::<Vec<_>>(),
+        ["carrier"]
+    );
+    assert!(
+        findings.sentence.contains("[carrier]: leading (model centre)"),
+        "{}",
+        findings.sentence
+    );
     let plant = extended_toml(&found);
     assert!(plant.contains("carrier = \"leading\"  # "), "{plant}");
     // held-out errors are those of the plant file as it is, and of the extended one
@@ -93,7 +105,11 @@ fn looked(table: &Table, plant: &Parameters) -> Option<Timing> {
     timing::of(&problem, &null)
 }
 
-const WHERE: [(Carrier, f64); 3] = [(Carrier::Trailing, 0.0), (Carrier::Centre, 0.5), (Carrier::Leading, 1.0)];
+const WHERE: [(Carrier, f64); 3] = [
+    (Carrier::Trailing, 0.0),
+    (Carrier::Centre, 0.5),
+    (Carrier::Leading, 1.0),
+];
 
 #[test]
 fn another_carrier_is_seen_before_any_search_at_any_instant() {
@@ -101,7 +117,14 @@ fn another_carrier_is_seen_before_any_search_at_any_instant() {
     for (word, on) in WHERE {
         for (wrong, _) in WHERE.into_iter().filter(|(other, _)| *other != word) {
             for sampled in [0.0, 0.25, 0.5, 0.7] {
-                let table = stepped(&Bench { carrier: on, sampled, ..Bench::default() }, random);
+                let table = stepped(
+                    &Bench {
+                        carrier: on,
+                        sampled,
+                        ..Bench::default()
+                    },
+                    random,
+                );
                 let found = looked(&table, &carrier(wrong, sampled));
                 let is_found = matches!(&found, Some(Timing::Other(_, found, _)) if *found == word);
                 assert!(is_found, "bench {word:?} plant {wrong:?} at {sampled}: {found:?}");
@@ -118,10 +141,34 @@ fn no_other_fault_is_taken_for_a_carrier() {
     let mut cases: Vec<(String, Bench)> = Vec::new();
     let mut add = |name: &str, bench: Bench| cases.push((name.to_owned(), bench));
     for part in [0.75, 0.85, 1.2, 1.4] {
-        add("inductance", Bench { inductance: part * good.inductance, ..good.clone() });
-        add("capacitance", Bench { capacitance: part * good.capacitance, ..good.clone() });
-        add("source", Bench { v_in: (1.0 + 0.2 * (part - 1.0)) * good.v_in, ..good.clone() });
-        add("winding", Bench { dcr: 4.0 * part * good.dcr, ..good.clone() });
+        add(
+            "inductance",
+            Bench {
+                inductance: part * good.inductance,
+                ..good.clone()
+            },
+        );
+        add(
+            "capacitance",
+            Bench {
+                capacitance: part * good.capacitance,
+                ..good.clone()
+            },
+        );
+        add(
+            "source",
+            Bench {
+                v_in: (1.0 + 0.2 * (part - 1.0)) * good.v_in,
+                ..good.clone()
+            },
+        );
+        add(
+            "winding",
+            Bench {
+                dcr: 4.0 * part * good.dcr,
+                ..good.clone()
+            },
+        );
         for n in [0, 1] {
             let mut gain = [1.0; 4];
             gain[n] = 1.0 + 0.3 * (part - 1.0);
@@ -133,25 +180,45 @@ fn no_other_fault_is_taken_for_a_carrier() {
             slow[n] = 2.0 * part;
             add("low-pass", Bench { slow, ..good.clone() });
         }
-        add("lost", Bench { lost: 0.02 * part, ..good.clone() });
+        add(
+            "lost",
+            Bench {
+                lost: 0.02 * part,
+                ..good.clone()
+            },
+        );
     }
     // a tie is said in a note, and rarely
     let mut perhaps = 0;
     for (word, on) in WHERE {
         for (name, bench) in &cases {
             for sampled in [0.0, 0.3, 0.5] {
-                let bench = Bench { carrier: on, sampled, ..bench.clone() };
+                let bench = Bench {
+                    carrier: on,
+                    sampled,
+                    ..bench.clone()
+                };
                 let found = looked(&stepped(&bench, random), &carrier(word, sampled));
-                assert!(!matches!(found, Some(Timing::Other(..))), "{name} {word:?} {sampled}: {found:?}");
+                assert!(
+                    !matches!(found, Some(Timing::Other(..))),
+                    "{name} {word:?} {sampled}: {found:?}"
+                );
                 perhaps += usize::from(found.is_some());
             }
         }
         for late in [-0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3, 0.45] {
-            let bench = Bench { carrier: on, sampled: 0.5, ..good.clone() };
+            let bench = Bench {
+                carrier: on,
+                sampled: 0.5,
+                ..good.clone()
+            };
             let mut table = stepped(&bench, random);
             table.column("t").iter_mut().for_each(|t| *t += late / bench.f_sw);
             let found = looked(&table, &carrier(word, 0.5));
-            assert!(!matches!(found, Some(Timing::Other(..))), "late {late} {word:?}: {found:?}");
+            assert!(
+                !matches!(found, Some(Timing::Other(..))),
+                "late {late} {word:?}: {found:?}"
+            );
             perhaps += usize::from(found.is_some());
         }
     }

@@ -70,7 +70,11 @@ fn a_voltage_that_never_moves_is_not_compared() {
     let mut stuck = table("v_out");
     stuck.column("v_out").fill(100.0);
     let found = diagnosed(&stuck, &ColumnMap::default());
-    assert!(line(&found).ends_with(" in i_l alone; v_out was not read"), "{}", line(&found));
+    assert!(
+        line(&found).ends_with(" in i_l alone; v_out was not read"),
+        "{}",
+        line(&found)
+    );
     assert!(!found.findings.compared.leaves_out());
     assert!(found.findings.sentence.contains("never moves"));
 }

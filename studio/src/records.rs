@@ -53,7 +53,8 @@ pub(crate) fn diagnose(session: &Session, wanted: &Wanted, tell: Tell) -> Result
         Progress::Stage(stage) => tell(stage),
         Progress::Done { done, total } => tell(&format!("{done} of {total}")),
     };
-    let diagnosis = examined(&model, train, &heldout, &say);
+    let mut diagnosis = examined(&model, train, &heldout, &say);
+    diagnosis.keep_text(&session.named(&wanted.model));
     let paths: Vec<&Path> = wanted.train.iter().chain(&wanted.heldout).map(Path::new).collect();
     let answer = Diagnosed {
         verdict: diagnosis.findings.verdict.word(),

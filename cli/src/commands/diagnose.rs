@@ -135,6 +135,7 @@ fn found(options: &Diagnose, columns: &ColumnMap, say: &(dyn Fn(Progress<'_>) + 
         .transpose()?;
     let (train, heldout) = records(options, columns, &model)?;
     let mut diagnosis = diagnose(&model, train, &heldout, say);
+    diagnosis.keep_text(&FileName::from(&options.model));
     if let Some(request) = closed_loop {
         say(Progress::Stage("closed loop"));
         diagnosis.close_the_loop(request);

@@ -6,6 +6,7 @@ mod inductor;
 use plant::Parameters;
 
 use super::{Capture, GAIN, Level};
+use crate::exact::Exact;
 use crate::words::{si, unit};
 
 /// A number that a capture shows.
@@ -171,13 +172,13 @@ fn edges(capture: &Capture, driven: &Driven, out: &mut Estimates) {
         Some(pin) => {
             let late = |time: f64| (time + 0.5 * t).rem_euclid(t) - 0.5 * t;
             let on = late(node.pulse.on.time - pin.on.time);
-            let sd = node.pulse.on.sd.hypot(pin.on.sd);
+            let sd = node.pulse.on.sd.hypotenuse(pin.on.sd);
             let off = late(on + width.time - pin.width.time);
             let [model_on, model_off] = driven.delays.map_or([None; 2], |delays| delays.map(Some));
             let [from_on, from_off] = ["v_pwm rises to v_sw rises", "v_pwm falls to v_sw falls"];
             out.values
                 .push(around("turn_on_delay", (on, sd), "s", model_on, from_on));
-            let sd = width.sd.hypot(pin.width.sd) / 2f64.sqrt();
+            let sd = width.sd.hypotenuse(pin.width.sd) / 2f64.sqrt();
             out.values
                 .push(around("turn_off_delay", (off, sd), "s", model_off, from_off));
         }
@@ -207,7 +208,9 @@ fn ripples(capture: &Capture, out: &mut Estimates) {
         // what was cut off was larger
         if let Some(fold) = capture.folds[n].as_ref().filter(|fold| !fold.has_holes()) {
             let bin = fold.noise / capture.bins.periods.max(1.0).sqrt();
-            let sd = (GAIN * fold.ripple()).hypot(2.0 * bin).hypot(fold.step / 12f64.sqrt());
+            let sd = (GAIN * fold.ripple())
+                .hypotenuse(2.0 * bin)
+                .hypotenuse(fold.step / 12f64.sqrt());
             out.values.push(around(
                 name,
                 (fold.ripple(), sd),
@@ -227,7 +230,7 @@ fn winding(capture: &Capture, driven: &Driven, p: &Parameters, out: &mut Estimat
     let i = capture.mean(1).map_or(driven.drawn, |i| i.value);
     if i > 0.0 {
         let value = (node.mean.value - v_out.value) / i;
-        let sd = node.mean.sd.hypot(v_out.sd) / i;
+        let sd = node.mean.sd.hypotenuse(v_out.sd) / i;
         out.values.push(around(
             "dcr",
             (value, sd),

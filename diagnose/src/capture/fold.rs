@@ -1,4 +1,5 @@
 //! All periods of a capture laid over each other: means in bins of one period, with the noise that the periods show.
+use crate::exact::Exact;
 
 /// Most bins: the ripple of a second-order filter has no more to say, and each costs a look of the plant.
 const MOST_BINS: usize = 200;
@@ -156,7 +157,7 @@ impl Bins {
         let sd = number
             .iter()
             .map(|n: &f64| match *n > 0.0 {
-                true => (noise / n.sqrt()).hypot(rounding).hypot(floor).max(1e-12),
+                true => (noise / n.sqrt()).hypotenuse(rounding).hypotenuse(floor).max(1e-12),
                 false => f64::INFINITY,
             })
             .collect();
@@ -168,7 +169,7 @@ impl Bins {
             value,
             sd,
             mean,
-            mean_sd: (noise / all.sqrt()).hypot(rounding),
+            mean_sd: (noise / all.sqrt()).hypotenuse(rounding),
             noise,
             step,
             span: (high - low).max(0.0),
@@ -180,7 +181,7 @@ impl Fold {
     /// With what a ringing node does to the channel.
     pub fn ringing(mut self) -> Self {
         let floor = RINGING * self.ripple() * (self.value.len() as f64 / INDEPENDENT).max(1.0).sqrt();
-        self.sd.iter_mut().for_each(|sd| *sd = sd.hypot(floor));
+        self.sd.iter_mut().for_each(|sd| *sd = sd.hypotenuse(floor));
         self
     }
 

@@ -28,6 +28,7 @@ pub use edges::At;
 pub use fold::{Bins, Fold};
 pub(crate) use read::{Samples, is_capture, read};
 
+use crate::exact::Exact;
 use crate::record::CHANNELS;
 
 /// What phase 0 of the bins is.
@@ -108,7 +109,7 @@ const STEPS: f64 = 200.0;
 
 /// Standard deviation of a mean value on a channel that spans `span` with steps of `quantum`.
 pub(crate) fn accuracy(value: f64, span: f64, quantum: f64) -> f64 {
-    (GAIN * value).hypot(OFFSET * span.max(STEPS * quantum))
+    (GAIN * value).hypotenuse(OFFSET * span.max(STEPS * quantum))
 }
 
 impl Capture {
@@ -119,7 +120,7 @@ impl Capture {
             .filter(|fold| !self.ac[channel] && fold.mean.is_finite())?;
         Some(Level {
             value: fold.mean,
-            sd: fold.mean_sd.hypot(accuracy(fold.mean, fold.span, fold.step)),
+            sd: fold.mean_sd.hypotenuse(accuracy(fold.mean, fold.span, fold.step)),
         })
     }
 }

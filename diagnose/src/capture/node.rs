@@ -2,6 +2,7 @@
 
 use super::fold::{Bins, Fold};
 use super::{Level, Node, Pulse, accuracy};
+use crate::exact::Exact;
 
 /// Levels are read off the middle of an interval: edges ring at its start.
 const MIDDLE: (f64, f64) = (0.25, 0.75);
@@ -32,7 +33,7 @@ pub(super) fn shown(
         let noise = fold.noise / (all.len() as f64 * bins.periods).sqrt();
         (!all.is_empty()).then(|| Level {
             value,
-            sd: noise.hypot(accuracy(value, fold.span, fold.step)),
+            sd: noise.hypotenuse(accuracy(value, fold.span, fold.step)),
         })
     };
     let inside = |start: f64, width: f64| level(start + MIDDLE.0 * width, start + MIDDLE.1 * width);
@@ -50,7 +51,7 @@ pub(super) fn shown(
             off: inside(on, 1.0 - on).filter(|_| !rests),
             mean: Level {
                 value: fold.mean,
-                sd: fold.mean_sd.hypot(accuracy(fold.mean, fold.span, fold.step)),
+                sd: fold.mean_sd.hypotenuse(accuracy(fold.mean, fold.span, fold.step)),
             },
         },
         rests,

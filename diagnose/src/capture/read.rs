@@ -6,6 +6,7 @@ use toml_input::Message;
 use super::edges::{At, Brackets, Edges, levels, of_node, repeated};
 use super::fold::{Bins, Fold};
 use super::{Capture, Level, Origin, Pulse, accuracy, alike, clean, node, period};
+use crate::exact::Exact;
 use crate::record::{CHANNEL_NAMES, CHANNELS};
 
 /// Fewest samples in a period of a capture: a triangle and a parabola need some on each of their sides.
@@ -111,7 +112,7 @@ pub(crate) fn read(mut samples: Samples, parameters: &Parameters) -> Result<Read
     let folds = folds.map(|fold| fold.map(|fold| if resting == Some(true) { fold.ringing() } else { fold }));
     let i_in = samples.i_in.as_deref().map(|v| bins.fold(v)).map(|fold| Level {
         value: fold.mean,
-        sd: fold.mean_sd.hypot(accuracy(fold.mean, fold.span, fold.step)),
+        sd: fold.mean_sd.hypotenuse(accuracy(fold.mean, fold.span, fold.step)),
     });
     let capture = Capture {
         period,
@@ -145,7 +146,7 @@ fn pulse(on: Option<At>, off: Option<At>, period: f64) -> Option<Pulse> {
     let (on, off) = (on?, off?);
     let width = At {
         time: (off.time - on.time).rem_euclid(period),
-        sd: on.sd.hypot(off.sd),
+        sd: on.sd.hypotenuse(off.sd),
     };
     Some(Pulse { on, width })
 }

@@ -14,6 +14,7 @@ use plant::{Carrier, Load, Parameters, Plant, Rectifier, Sensor, Waveform};
 use super::fold::bin_mean;
 use super::{Capture, GAIN, Origin};
 use crate::drive::{Model, sensors};
+use crate::exact::Exact;
 use crate::record::CHANNELS;
 
 /// Looks in a period of the plant: a ripple's parabola is off by 1e-5 of itself between them.
@@ -261,7 +262,7 @@ impl Capture {
         // the duty is the node's own: its width says nothing
         let on_time = match drive.applied {
             true => 0.0,
-            false => (width.time / self.period - shown.on) * period / width.sd.hypot(SLOPE),
+            false => (width.time / self.period - shown.on) * period / width.sd.hypotenuse(SLOPE),
         };
         let i_on = shown.within(1, 0.25 * shown.on, 0.75 * shown.on);
         let on = shown.within(3, 0.25 * shown.on, 0.75 * shown.on) - switch.r_ds_on * i_on;
@@ -282,7 +283,7 @@ impl Capture {
     /// How much later than assumed the model's period lies, fractions, and the standard deviation that holds it there (0: nothing).
     fn shift(&self, shown: &Shown) -> (f64, f64) {
         let sd = match (&self.node, self.origin) {
-            (Some(node), Origin::Node) => node.pulse.on.sd.hypot(SKEW).hypot(0.3 * self.step) / self.period,
+            (Some(node), Origin::Node) => node.pulse.on.sd.hypotenuse(SKEW).hypotenuse(0.3 * self.step) / self.period,
             _ => 0.0,
         };
         let cost = |shift: f64| {

@@ -79,7 +79,7 @@ pub fn candidates(problem: &Problem, shown: &[[f64; 2]], plant: &mut Parameters)
     let time = (plant.converter.inductance * plant.converter.capacitance).sqrt();
     // the filter takes its time whatever the duty does: what is left behind a change of the duty is left that long
     p.rate_time = time.max(2.0 * problem.bases.t_sw);
-    let share = 1.0 - (-problem.bases.t_sw / p.rate_time).exp();
+    let share = 1.0 - libm::exp(-problem.bases.t_sw / p.rate_time);
     let duties = problem.records.iter().flat_map(|record| record.duty.iter().copied());
     let duty = range(duties);
     let rates = problem.records.iter().flat_map(|record| {

@@ -67,7 +67,11 @@ impl<'a> Raw<'a> {
                 .map(|(name, column)| format!("`{column}` looks like {name}"))
                 .collect();
             repairs.push(format!("{} and is not read as such: {map}", alike.join(", ")));
-            unread.extend(guesses.iter().filter_map(|(name, column)| Unread::looks_like(name, column)));
+            unread.extend(
+                guesses
+                    .iter()
+                    .filter_map(|(name, column)| Unread::looks_like(name, column)),
+            );
         }
         Ok(Raw {
             repairs,

@@ -5,6 +5,7 @@ use plant::Parameters;
 use super::{Driven, Estimates, around};
 use crate::capture::fold::INDEPENDENT;
 use crate::capture::{Capture, Fold, GAIN, Origin};
+use crate::exact::Exact;
 use crate::search::gained;
 
 /// `v = esr i + q / c` over the period: the ripple of the current is measured, or that of the model.
@@ -48,7 +49,7 @@ pub(super) fn capacitor(capture: &Capture, driven: &Driven, p: &Parameters, out:
     let (esr, elastance) = (solved.esr, solved.elastance);
     // a resistance below nothing fits where the ripple is below what the capture resolves
     if esr.0 + 1.96 * esr.1 > 0.0 {
-        let sd = esr.1.hypot(probe * esr.0);
+        let sd = esr.1.hypotenuse(probe * esr.0);
         out.values
             .push(around("esr", (esr.0, sd), "ohm", Some(p.capacitor.esr), from));
     }
@@ -58,7 +59,7 @@ pub(super) fn capacitor(capture: &Capture, driven: &Driven, p: &Parameters, out:
         let model = Some(p.converter.capacitance);
         out.values.push(around(
             "capacitance",
-            (value, value * relative.hypot(probe)),
+            (value, value * relative.hypotenuse(probe)),
             "F",
             model,
             from,

@@ -5,6 +5,7 @@ use plant::Parameters;
 use super::{Estimates, around};
 use crate::capture::fold::INDEPENDENT;
 use crate::capture::{Capture, GAIN, Level, Origin};
+use crate::exact::Exact;
 
 /// Part of an interval between edges over which a slope is fitted.
 const STRAIGHT: (f64, f64) = (0.12, 0.9);
@@ -106,9 +107,9 @@ pub(super) fn inductance(capture: &Capture, p: &Parameters, out: &mut Estimates)
             let high = capture.node.as_ref().map_or(p.converter.v_in, |node| node.on.value);
             ((high - v_out) / slopes.up.0, slopes.up.1 / slopes.up.0)
         }
-        false => (swing.value / bend, slopes.up.1.hypot(slopes.down.1) / bend),
+        false => (swing.value / bend, slopes.up.1.hypotenuse(slopes.down.1) / bend),
     };
-    let share = sd.hypot(swing.sd / swing.value).hypot(GAIN).hypot(BENT);
+    let share = sd.hypotenuse(swing.sd / swing.value).hypotenuse(GAIN).hypotenuse(BENT);
     if value.is_finite() && value > 0.0 {
         let model = Some(p.converter.inductance);
         out.values

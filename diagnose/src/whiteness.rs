@@ -1,0 +1,183 @@
+//! How well the model fits each channel of the training records, and whether what it leaves is noise, as figures.
+//!
+//! - The fit is 100 % less the error over the scatter of the signal, as in identification at large.
+//! - Ljung and Box's sum over the correlations of a residual with itself tells colour: for white noise it is a chi-square.
+//! - The correlation with duty and load, some rows later, tells what of these the model does not carry on.
+//!
+//! No verdict hangs on them: real noise is never quite white, and a large record tells it (`shape` has a level of its own).
+
+use serde::Serialize;
+
+use crate::fit::State;
+use crate::noise::channel;
+use crate::problem::Problem;
+use crate::record::{CHANNEL_NAMES, CHANNELS};
+
+/// Lags that are looked at: two milliseconds at 10 kHz, most of a period of the paper's filter.
+const LAGS: usize = 20;
+/// Fewest rows for so many lags.
+const FEWEST: usize = 60;
+/// 99 % of a normal number, to either side.
+const BAND: f64 = 2.576;
+
+/// A correlation at the lag where it is largest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Largest {
+    /// The correlation.
+    pub correlation: f64,
+    /// Rows by which the residual follows.
+    pub lag: usize,
+}
+
+/// Figures of one channel of one record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Whiteness {
+    /// Record.
+    pub record: String,
+    /// Channel.
+    pub channel: &'static str,
+    /// Fit without and with what was found, %.
+    pub fit: [f64; 2],
+    /// Mean square over that of the noise, without and with what was found.
+    pub mean_square: [f64; 2],
+    /// Ljung and Box's sum over twenty lags.
+    pub ljung_box: f64,
+    /// Chance that white noise has more.
+    pub chance: f64,
+    /// With the duty, if that moves.
+    pub with_duty: Option<Largest>,
+    /// With the set load, if that moves.
+    pub with_load: Option<Largest>,
+    /// Within this to either side are 99 % of the correlations of noise at one lag.
+    pub band: f64,
+}
+
+/// The figures of all channels of records over time; `null` is the model as given.
+#[must_use]
+pub fn of(problem: &Problem, null: &State, state: &State) -> Vec<Whiteness> {
+    let mut list = Vec::new();
+    for (index, record) in problem.records.iter().enumerate() {
+        if record.settled || record.capture.is_some() {
+            continue;
+        }
+        for (n, name) in CHANNEL_NAMES.iter().enumerate().take(CHANNELS) {
+            let left = channel(problem, &state.residual, index, n);
+            let before = channel(problem, &null.residual, index, n);
+            let rows: Vec<usize> = (0..left.len()).filter(|row| left[*row] != 0.0).collect();
+            if rows.len() < FEWEST {
+                continue;
+            }
+            let signal: Vec<f64> = rows
+                .iter()
+                .map(|row| record.measured[n][*row] / problem.sigma[n])
+                .collect();
+            let pick = |values: &[f64]| rows.iter().map(|row| values[*row]).collect::<Vec<f64>>();
+            let load: Vec<f64> = (record.load.iter())
+                .map(|load| load.current + load.conductance * problem.bases.v + load.power / problem.bases.v)
+                .collect();
+            let (shown, was) = (pick(&left), pick(&before));
+            let (ljung_box, chance) = ljung_box(&shown);
+            list.push(Whiteness {
+                record: record.name.clone(),
+                channel: name,
+                fit: [&was, &shown].map(|left| fit(&signal, left)),
+                mean_square: [&was, &shown].map(|left| left.iter().map(|v| v * v).sum::<f64>() / left.len() as f64),
+                ljung_box,
+                chance,
+                with_duty: largest(&shown, &pick(&record.duty)),
+                with_load: largest(&shown, &pick(&load)),
+                band: BAND / (rows.len() as f64).sqrt(),
+            });
+        }
+    }
+    list
+}
+
+/// 100 % less the error over the scatter of the signal.
+fn fit(signal: &[f64], left: &[f64]) -> f64 {
+    let mean = signal.iter().sum::<f64>() / signal.len() as f64;
+    let scatter: f64 = signal.iter().map(|v| (v - mean) * (v - mean)).sum();
+    let error: f64 = left.iter().map(|v| v * v).sum();
+    100.0 * (1.0 - (error / scatter.max(f64::MIN_POSITIVE)).sqrt())
+}
+
+fn centred(values: &[f64]) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    values.iter().map(|v| v - mean).collect()
+}
+
+fn lagged(a: &[f64], b: &[f64], lag: usize) -> f64 {
+    a.iter().skip(lag).zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The sum and the chance that white noise has more (Wilson and Hilferty's normal number of a chi-square).
+fn ljung_box(values: &[f64]) -> (f64, f64) {
+    let (a, n) = (centred(values), values.len() as f64);
+    let square = lagged(&a, &a, 0).max(f64::MIN_POSITIVE);
+    let terms = (1..=LAGS).map(|lag| {
+        let r = lagged(&a, &a, lag) / square;
+        r * r / (n - lag as f64)
+    });
+    let sum = n * (n + 2.0) * terms.sum::<f64>();
+    let (count, spread) = (LAGS as f64, 2.0 / (9.0 * LAGS as f64));
+    let normal = (libm::cbrt(sum / count) - (1.0 - spread)) / spread.sqrt();
+    (sum, 0.5 * libm::erfc(normal / std::f64::consts::SQRT_2))
+}
+
+/// The largest correlation of a residual with what drives the converter; nothing if that stands still.
+fn largest(left: &[f64], input: &[f64]) -> Option<Largest> {
+    let (a, b) = (centred(left), centred(input));
+    let scale = (lagged(&a, &a, 0) * lagged(&b, &b, 0)).sqrt();
+    let moves = input.windows(2).any(|pair| pair[0] != pair[1]);
+    let each = (0..=LAGS).map(|lag| Largest {
+        correlation: lagged(&a, &b, lag) / scale,
+        lag,
+    });
+    each.filter(|_| moves && scale > 0.0)
+        .max_by(|a, b| a.correlation.abs().total_cmp(&b.correlation.abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{fit, largest, ljung_box};
+
+    fn noise(count: usize, seed: u64) -> Vec<f64> {
+        let mut state = seed;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        (0..count).map(|_| (0..12).map(|_| uniform()).sum()).collect()
+    }
+
+    #[test]
+    fn white_noise_has_a_chance_that_is_evenly_spread_and_coloured_noise_none() {
+        let chances: Vec<f64> = (0..200).map(|seed| ljung_box(&noise(300, seed + 1)).1).collect();
+        for limit in [0.1, 0.5, 0.9] {
+            let share = chances.iter().filter(|chance| **chance < limit).count() as f64 / 200.0;
+            // three standard deviations of a share of 200
+            assert!(
+                (share - limit).abs() < 3.0 * (limit * (1.0 - limit) / 200.0).sqrt(),
+                "{limit}: {share}"
+            );
+        }
+        let white = noise(300, 5);
+        let coloured: Vec<f64> = white.windows(2).map(|pair| pair[1] + 0.6 * pair[0]).collect();
+        assert!(ljung_box(&coloured).1 < 1e-3);
+    }
+
+    #[test]
+    fn a_residual_that_follows_its_input_is_seen_at_its_lag() {
+        let input: Vec<f64> = (0..300).map(|n| f64::from(u8::from((n / 37) % 2 == 0))).collect();
+        let white = noise(300, 6);
+        let left: Vec<f64> = (0..300).map(|n| white[n] + 2.0 * input[usize::max(n, 5) - 5]).collect();
+        let found = largest(&left, &input).unwrap();
+        assert!(found.lag.abs_diff(5) <= 1 && found.correlation > 0.5, "{found:?}");
+        assert!(largest(&left, &[1.0; 300]).is_none());
+        // an error of a tenth of the scatter
+        let tenth: Vec<f64> = input.iter().map(|v| 0.1 * (v - 0.5)).collect();
+        assert!((fit(&input, &tenth) - 90.0).abs() < 0.5, "{}", fit(&input, &tenth));
+    }
+}

@@ -80,7 +80,7 @@ pub fn design(topology: Topology, random: &mut Rng) -> Design {
     } else {
         (1.0 - duty).powi(2)
     };
-    let swing = random.uniform(12.0, 45.0);
+    let swing = random.uniform(10.0, 30.0);
     let mut c = factor * (swing / (2.0 * PI * f_sw)).powi(2) / l;
     if topology != Topology::Buck {
         c = c.max(i_out * duty / (0.05 * v_out * f_sw));

@@ -31,23 +31,15 @@ pub fn programs(design: &Design, needs: Needs, extent: Extent, random: &mut Rng)
         return tables(design, needs, random);
     }
     let kinds = kinds(needs, random);
-    let heldout = if extent == Extent::Short {
-        1
-    } else {
-        1 + random.below(2)
-    };
-    let train = if extent == Extent::Short {
-        1
-    } else {
-        2 + random.below(2)
-    };
+    let heldout = 1;
+    let train = if extent == Extent::Short { 1 } else { 2 };
     let mut all = Vec::new();
     for number in 0..train + heldout {
         let judged = number >= train;
         let kind = kinds[number % kinds.len()];
         let rows = match extent {
-            Extent::Full => 200 + 20 * random.below(11),
-            Extent::Short => 120,
+            Extent::Full => 110 + 10 * random.below(8),
+            Extent::Short => 80,
         };
         let name = format!("{}{number:02}", ["run_", "rec", "m", "log-"][random.below(4)]);
         all.push(record(design, kind, (name, judged, rows), random));
@@ -71,7 +63,7 @@ fn kinds(needs: Needs, random: &mut Rng) -> Vec<Kind> {
 /// Duty held and load stepping, duty stepping, both, or small pseudo-random duties.
 fn record(design: &Design, kind: Kind, (name, heldout, rows): (String, bool, usize), random: &mut Rng) -> Program {
     let lead = 4;
-    let hold = ((design.swing * random.uniform(1.2, 2.5)) as usize).clamp(20, 120);
+    let hold = ((design.swing * random.uniform(0.8, 1.5)) as usize).clamp(15, 45);
     let what = random.below(4);
     let span = match design.world.board.topology {
         Topology::Buck => 0.25,
@@ -79,7 +71,7 @@ fn record(design: &Design, kind: Kind, (name, heldout, rows): (String, bool, usi
     };
     let mut duty = level(design, span, random);
     let mut share = random.uniform(0.6, 1.0);
-    let (mut periods, mut left) = (Vec::new(), hold.min(30));
+    let (mut periods, mut left) = (Vec::new(), hold.min(15));
     let mut small = 0.0;
     for k in 0..lead + rows {
         if left == 0 {

@@ -87,7 +87,12 @@ pub fn bench(name: Name, id: &'static str, options: Options, random: &mut Rng) -
             let draft = measured(&design, &world, Needs::default(), options, random)?;
             seen(&draft)?;
             let what = format!("the supply gives {:.1} % of the plant file's voltage", 100.0 * factor);
-            let fault = fault(id, &what, &[&["source voltage"]], &["v_in_wrong"]);
+            let fault = fault(
+                id,
+                &what,
+                &[&["source voltage"], &["looks like a source"]],
+                &["v_in_wrong"],
+            );
             Some(draft.case(name, hidden(id, what), naming(&fault), &[], options.rivals, random))
         }
         "heldout_is_training" => {
@@ -99,7 +104,7 @@ pub fn bench(name: Name, id: &'static str, options: Options, random: &mut Rng) -
                 &["same", "train"],
                 &["identical"],
                 &["equal", "train"],
-                &["copy"],
+                &["again", "training record"],
                 &["same", "held"],
             ];
             let mut expect = expected(&fault(id, &what, &groups, &[]));

@@ -72,12 +72,12 @@ pub fn spoil(id: &'static str, design: &Design, tables: &mut [Table], random: &m
             fault(
                 id,
                 format!("{name} has the turned sign"),
-                &[&["sign"], &["*-1"], &["negative"], &["polarity"]],
+                &[&["turned sign"], &["*-1"], &["polarity"], &["other way round"]],
             )
         }
         "times_2" => {
             scale(tables, 2.0);
-            let words: [&[&str]; 4] = [&["*0.5"], &["twice"], &["probe"], &["half"]];
+            let words: [&[&str]; 3] = [&["*0.5"], &["twice"], &["probe"]];
             fault(id, format!("{name} twice its value"), &words)
         }
         "times_10" => {
@@ -94,7 +94,7 @@ pub fn spoil(id: &'static str, design: &Design, tables: &mut [Table], random: &m
             fault(
                 id,
                 format!("{name} in thousandths of its unit"),
-                &[&["mv"], &["ma"], &["0.001"], &["1000"], &["times"]],
+                &[&["[mv]"], &["[ma]"], &["not in v"], &["not in a"], &["1000 times"]],
             )
         }
         "exchanged" => {
@@ -160,7 +160,7 @@ fn spoil_rows(
             for value in tables.iter_mut().flat_map(|table| &mut table.values[channel]) {
                 *value = value.min(limit);
             }
-            let words: [&[&str]; 4] = [&["cut off"], &["clip"], &["saturat"], &["end of", "range"]];
+            let words: [&[&str]; 4] = [&["cut off"], &["clip"], &["end of a range"], &["end of its range"]];
             Some(Fault {
                 harmless: true,
                 ..fault(id, format!("{name} cut off at {limit:.4}"), &words)
@@ -188,7 +188,7 @@ fn spoil_rows(
                     table.values[channel][row] += if random.chance(0.5) { size } else { -size };
                 }
             }
-            let words: [&[&str]; 3] = [&["outlier"], &["spike"], &["single"]];
+            let words: [&[&str]; 3] = [&["outlier"], &["spike"], &["single row"]];
             Some(Fault {
                 harmless: true,
                 ..fault(id, format!("spikes on {name}"), &words)

@@ -118,10 +118,18 @@ fn named(diagnosis: &Value) -> Vec<Named> {
 fn says(truth: &Truth, answer: &Answer) -> bool {
     let diagnosis = &answer.diagnosis;
     let mut text = answer.said.clone();
-    for key in ["sentence", "doubts", "noise", "notes", "bench"] {
-        text.push_str(&diagnosis[key].to_string());
+    // words of values alone: the names of the keys hold some of them, too
+    let values = ["/sentence", "/doubts", "/noise/repairs", "/notes"].map(|key| diagnosis.pointer(key).cloned());
+    for value in values.into_iter().flatten() {
+        text.push_str(&value.to_string());
     }
-    let text = text.to_lowercase().replace(' ', " ");
+    if diagnosis["noise"]["outliers"]
+        .as_array()
+        .is_some_and(|outliers| !outliers.is_empty())
+    {
+        text.push_str(" outlier");
+    }
+    let text = text.to_lowercase();
     let has = |word: &String| text.contains(&word.to_lowercase());
     truth.expect.words.iter().any(|group| group.iter().all(has))
 }
@@ -178,7 +186,9 @@ fn refusal(truth: &Truth, answer: &Answer) -> Outcome {
 
 /// Whether a cause is one that may be named, or has one among its rivals that adds nothing to it.
 fn right(truth: &Truth, cause: &Named) -> bool {
-    let may = |id: &String| truth.expect.causes.contains(id);
+    // of what no list has, a cause that leaves next to nothing cannot be told by anybody
+    let tied = |id: &String| truth.family == Family::Unlisted && truth.ties.iter().any(|tie| tie.id == *id);
+    let may = |id: &String| truth.expect.causes.contains(id) || tied(id);
     let hidden = |id: &String| truth.hidden.iter().any(|hidden| hidden.id == *id);
     may(&cause.id)
         || cause
@@ -197,12 +207,12 @@ fn answered(truth: &Truth, answer: &Answer, verdict: &str, causes: &[Named]) -> 
     };
     if causes.is_empty() {
         return match verdict {
-            _ if fault_named => Outcome::Right,
+            _ if fault_named && (expect.refusal || verdict == "consistent") => Outcome::Right,
             "consistent" if expect.verdicts.iter().any(|right| right == "consistent") => Outcome::Right,
             "consistent" if unseen(truth) => Outcome::Right,
             "consistent" if truth.family == Family::Bench => Outcome::NotNamed,
             "consistent" => Outcome::Missed,
-            _ if truth.family == Family::Bench && !expect.must_name => Outcome::NotNamed,
+            _ if truth.family == Family::Bench && !expect.must_name && expect.refusal => Outcome::NotNamed,
             "unexplained" if expect.verdicts.iter().any(|right| right == "unexplained") => Outcome::Right,
             // nothing named, and one channel or record set aside
             "mostly_explained" if expect.set_aside.is_some() && !expect.must_name => Outcome::Right,
@@ -216,7 +226,7 @@ fn answered(truth: &Truth, answer: &Answer, verdict: &str, causes: &[Named]) -> 
             Outcome::Right
         };
     }
-    match good > 0 && right(truth, &causes[0]) {
+    match fault_named || good > 0 && right(truth, &causes[0]) {
         true => Outcome::RightAndWrong,
         false => wrong(verdict),
     }

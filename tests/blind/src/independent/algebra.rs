@@ -7,7 +7,7 @@ pub fn solve(matrix: &mut [Vec<f64>]) -> Option<Vec<f64>> {
         let pivot = (column..n).max_by(|&a, &b| matrix[a][column].abs().total_cmp(&matrix[b][column].abs()))?;
         matrix.swap(column, pivot);
         let head = matrix[column][column];
-        if !(head.abs() > 1e-13) {
+        if head.is_nan() || head.abs() <= 1e-13 {
             return None;
         }
         for row in column + 1..n {
@@ -15,8 +15,9 @@ pub fn solve(matrix: &mut [Vec<f64>]) -> Option<Vec<f64>> {
             if factor == 0.0 {
                 continue;
             }
-            for k in column..=n {
-                matrix[row][k] -= factor * matrix[column][k];
+            let (above, below) = matrix.split_at_mut(row);
+            for (value, head) in below[0][column..].iter_mut().zip(&above[column][column..]) {
+                *value -= factor * head;
             }
         }
     }
@@ -32,7 +33,7 @@ pub fn solve(matrix: &mut [Vec<f64>]) -> Option<Vec<f64>> {
 pub fn fit(columns: &[Vec<f64>], target: &[f64]) -> Option<(Vec<f64>, f64)> {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let scale: Vec<f64> = columns.iter().map(|column| dot(column, column).sqrt()).collect();
-    if scale.iter().any(|scale| !(*scale > 0.0)) {
+    if scale.iter().any(|scale| scale.is_nan() || *scale <= 0.0) {
         return None;
     }
     let mut matrix: Vec<Vec<f64>> = columns

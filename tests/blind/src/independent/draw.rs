@@ -40,24 +40,7 @@ impl Design {
 /// Draws one of a topology.
 pub fn design(topology: Topology, random: &mut Rng) -> Design {
     let f_sw = 1e3 * libm::round(random.log_uniform(20.0, 1000.0));
-    let (v_in, duty, v_out) = loop {
-        let v_in = round(random.log_uniform(3.3, 400.0), 2);
-        let duty = match topology {
-            Topology::Buck => random.uniform(0.15, 0.8),
-            _ => random.uniform(0.2, 0.65),
-        };
-        let v_out = v_in * ratio(topology, duty);
-        if (1.0..=400.0).contains(&v_out) {
-            break (v_in, duty, v_out);
-        }
-    };
-    let i_out = loop {
-        let i = random.log_uniform(0.5, 20.0);
-        // below 50 mohm and beyond 2 kW other circuits are built
-        if v_out / i > 0.1 && v_out * i < 2000.0 {
-            break i;
-        }
-    };
+    let (v_in, duty, v_out, i_out) = ratings(topology, random);
     let i_l = if topology == Topology::Buck {
         i_out
     } else {
@@ -122,6 +105,28 @@ pub fn design(topology: Topology, random: &mut Rng) -> Design {
         swing,
         quality,
         noise_stated: random.chance(0.8),
+    }
+}
+
+/// Voltages, duty and current.
+fn ratings(topology: Topology, random: &mut Rng) -> (f64, f64, f64, f64) {
+    let (v_in, duty, v_out) = loop {
+        let v_in = round(random.log_uniform(3.3, 400.0), 2);
+        let duty = match topology {
+            Topology::Buck => random.uniform(0.15, 0.8),
+            _ => random.uniform(0.2, 0.65),
+        };
+        let v_out = v_in * ratio(topology, duty);
+        if (1.0..=400.0).contains(&v_out) {
+            break (v_in, duty, v_out);
+        }
+    };
+    loop {
+        let i = random.log_uniform(0.5, 20.0);
+        // below 50 mohm and beyond 2 kW other circuits are built
+        if v_out / i > 0.1 && v_out * i < 2000.0 {
+            break (v_in, duty, v_out, i);
+        }
     }
 }
 

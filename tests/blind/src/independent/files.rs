@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::independent::board::{Carrier, Topology};
+use crate::independent::board::{Carrier, Load, Topology};
 use crate::independent::draw::{Design, round};
 use crate::independent::instruments::CHANNELS;
 use crate::independent::program::Table;
@@ -97,6 +97,9 @@ impl Style {
     }
 }
 
+/// A number of a load.
+type Part = fn(&Load) -> f64;
+
 /// The columns of a table by name, units and all.
 fn columns(table: &Table, style: Style, floors: &[f64; 6]) -> Vec<(String, Vec<f64>)> {
     let mut columns = Vec::new();
@@ -139,7 +142,7 @@ fn columns(table: &Table, style: Style, floors: &[f64; 6]) -> Vec<(String, Vec<f
         let written = |value: &f64| libm::round(value * factor * scale) / scale;
         columns.push((format!("{name}{unit}"), values.iter().map(written).collect()));
     }
-    let set: [(&str, fn(&crate::independent::board::Load) -> f64); 3] = [
+    let set: [(&str, Part); 3] = [
         ("r_load", |load| if load.g > 0.0 { 1.0 / load.g } else { 0.0 }),
         ("i_load", |load| load.i),
         ("p_load", |load| load.p),

@@ -184,11 +184,18 @@ fn refusal(truth: &Truth, answer: &Answer) -> Outcome {
     }
 }
 
+/// A delay of all channels and a late sampling instant are one thing.
+fn same_instant(truth: &Truth, id: &str) -> bool {
+    let late = |id: &str, what: &str| id == "sampling_delay" || id == "sensor_delay" && what.contains("all channels");
+    let hidden = truth.hidden.iter().any(|hidden| late(&hidden.id, &hidden.what));
+    hidden && ["sampling_delay", "sensor_delay"].contains(&id)
+}
+
 /// Whether a cause is one that may be named, or has one among its rivals that adds nothing to it.
 fn right(truth: &Truth, cause: &Named) -> bool {
     // of what no list has, a cause that leaves next to nothing cannot be told by anybody
     let tied = |id: &String| truth.family == Family::Unlisted && truth.ties.iter().any(|tie| tie.id == *id);
-    let may = |id: &String| truth.expect.causes.contains(id) || tied(id);
+    let may = |id: &String| truth.expect.causes.contains(id) || tied(id) || same_instant(truth, id);
     let hidden = |id: &String| truth.hidden.iter().any(|hidden| hidden.id == *id);
     may(&cause.id)
         || cause

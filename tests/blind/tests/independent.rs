@@ -186,7 +186,7 @@ fn a_refused_topology_is_counted_apart() {
 #[test]
 fn the_gain_is_measured_from_the_true_floor() {
     let mut diagnosis = answer("explained", &json!([{"id": "dcr"}]));
-    let line = |record: &str, regime: &str| json!({"record": record, "channel": "v_out", "regime": regime, "rmse_before": 1.0, "rmse_after": 0.28});
+    let line = |record: &str, regime: &str| json!({"record": record, "channel": "v_o", "regime": regime, "rmse_before": 1.0, "rmse_after": 0.28});
     diagnosis.diagnosis["gain"] =
         json!({"heldout": [line("heldout/a.csv", "all"), line("a", "DCM"), line("b", "all")]});
     let judged = judge(&dcr(), &diagnosis);

@@ -261,10 +261,16 @@ fn removed(truth: &Truth, diagnosis: &Value) -> Vec<f64> {
         }
         let record = line["record"].as_str().unwrap_or_default();
         let stem = record.rsplit('/').next().unwrap_or_default().trim_end_matches(".csv");
+        // the answer writes the short names
+        let channel = match line["channel"].as_str().unwrap_or_default() {
+            "v_o" => "v_out",
+            "i_o" => "i_out",
+            name => name,
+        };
         let of = truth
             .records
             .iter()
-            .find(|of| of.record == stem && line["channel"] == of.channel.as_str());
+            .find(|of| of.record == stem && of.channel == channel);
         let Some(of) = of.filter(|of| of.reducible > WORTH * of.floor) else {
             continue;
         };

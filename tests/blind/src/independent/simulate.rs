@@ -51,11 +51,20 @@ impl Walk<'_> {
             if path == Path::Diode && self.recovering > t {
                 until = until.min(self.recovering);
             }
+            let slope = self.x[I_L].max(0.0) / self.board.gates.node.max(f64::MIN_POSITIVE);
+            if self.node > 0.0 && slope > 0.0 {
+                until = until.min(t + self.node / slope);
+            }
             let mut h = (until - t).min(self.h).max(tiny);
             let step = Step {
                 board: self.board,
                 path,
-                node: self.node,
+                // the ramp's value in the middle of the step
+                node: if self.node > 0.0 {
+                    (self.node - 0.5 * slope * h).max(0.0)
+                } else {
+                    0.0
+                },
                 load,
                 warm: 1.0 + self.warmth,
             };
@@ -116,6 +125,10 @@ impl Walk<'_> {
             _ if self.starts() => Path::Diode,
             _ => Path::Rest,
         };
+        // a switch pulls the node down at once
+        if path == Path::Second {
+            self.node = 0.0;
+        }
         // a current that rests has given its diode time to recover
         self.was = if path == Path::Second { Path::Diode } else { path };
         path

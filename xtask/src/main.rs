@@ -40,7 +40,7 @@ usage: cargo xtask <command>
                                     policies drawn at random, every build against the interpreter (docs/evidence.md; --help)
   fuzz [--seconds N|--executions N] [--target NAME] ...
                                     damaged bytes for every reader (docs/results/fuzzing.md; --help)
-  blind --seed S --out DIR ...      blind cases for the diagnosis and their score (docs/reference/blind-cases.md; --help)
+  blind --out DIR ...               blind cases for the diagnosis and their score (docs/reference/blind-cases.md; --help)
 ";
 
 #[derive(Debug, PartialEq)]

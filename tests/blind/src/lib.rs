@@ -6,6 +6,7 @@ pub mod case;
 pub mod control;
 pub mod effects;
 pub mod experiment;
+pub mod independent;
 pub mod netlist;
 pub mod ngspice;
 pub mod plan;

@@ -8,17 +8,21 @@ use std::time::Instant;
 
 use blind::case::{Truth, measure};
 use blind::experiment::Extent;
+use blind::independent::{Family, Set};
 use blind::plan::{Plan, plan, plan_of};
 use blind::score::{Closed, Diagnosis, closed_table, judge, table};
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 
 /// Hides effects in data of an independent simulator. See docs/reference/blind-cases.md.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask blind")]
 struct Arguments {
-    /// Everything follows from it.
+    /// Everything follows from it. Left out, it is that of the folder, or drawn anew.
     #[arg(long)]
-    seed: u64,
+    seed: Option<u64>,
+    /// Who makes the cases: ngspice with the effects that the diagnosis lists, or the world that knows nothing of it.
+    #[arg(long, value_enum, default_value_t = World::Ngspice)]
+    world: World,
     /// How many.
     #[arg(long, default_value_t = 48)]
     cases: usize,
@@ -31,12 +35,16 @@ struct Arguments {
     /// Do not look for rivals of the truth: twenty times as fast.
     #[arg(long)]
     no_rivals: bool,
-    /// Hide these effects in every case instead of drawing them: ids with commas, or "none".
+    /// Hide these effects in every case instead of drawing them: ids with commas, or "none". With `--world independent`: a
+    /// family of cases.
     #[arg(long)]
     only: Option<String>,
     /// Diagnose each case and write DIR/score.md.
     #[arg(long)]
     score: bool,
+    /// With `--world independent`: no boost and no buck-boost.
+    #[arg(long)]
+    buck_only: bool,
     /// With --score: the mapping of this policy is refitted in each diagnosis, and the hidden converter judges it.
     #[arg(long, requires = "score")]
     closed_loop: Option<PathBuf>,
@@ -48,11 +56,25 @@ struct Arguments {
     jobs: usize,
 }
 
+/// Who makes the cases.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum World {
+    Ngspice,
+    Independent,
+}
+
+impl Arguments {
+    fn seed(&self) -> u64 {
+        self.seed.unwrap_or_default()
+    }
+}
+
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    let outcome = generate(&arguments).and_then(|()| match arguments.score {
-        true => score(&arguments),
-        false => Ok(()),
+    let mut arguments = Arguments::parse();
+    let outcome = settle_seed(&mut arguments).and_then(|()| match (arguments.world, arguments.score) {
+        (World::Independent, _) => independent(&arguments),
+        (World::Ngspice, true) => generate(&arguments).and_then(|()| score(&arguments)),
+        (World::Ngspice, false) => generate(&arguments),
     });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -63,13 +85,59 @@ fn main() -> ExitCode {
     }
 }
 
+/// The seed that was given, that of the folder, or one drawn from the clock; the folder keeps it.
+fn settle_seed(arguments: &mut Arguments) -> Result<(), String> {
+    let path = arguments.out.join("seed.txt");
+    let kept = std::fs::read_to_string(&path)
+        .ok()
+        .and_then(|text| text.trim().parse().ok());
+    let drawn = || {
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+        now.map_or(1, |now| (now.as_nanos() % 1_000_000_007) as u64)
+    };
+    let seed = arguments.seed.or(kept).unwrap_or_else(drawn);
+    arguments.seed = Some(seed);
+    create(&arguments.out)?;
+    std::fs::write(&path, format!("{seed}\n")).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+fn policyc(arguments: &Arguments) -> PathBuf {
+    let beside = || Some(std::env::current_exe().ok()?.with_file_name("policyc"));
+    let given = arguments.policyc.clone();
+    given.or_else(beside).unwrap_or_else(|| "policyc".into())
+}
+
+fn independent(arguments: &Arguments) -> Result<(), String> {
+    let family = |word: &String| {
+        let known = Family::ALL.into_iter().find(|family| family.word() == word);
+        let words = Family::ALL.map(Family::word).join(", ");
+        known.ok_or_else(|| format!("--only {word}: no such family; there are {words}"))
+    };
+    let set = Set {
+        seed: arguments.seed(),
+        cases: arguments.cases,
+        out: arguments.out.clone(),
+        only: arguments.only.as_ref().map(family).transpose()?,
+        short: arguments.short,
+        rivals: !arguments.no_rivals,
+        buck_only: arguments.buck_only,
+        jobs: arguments.jobs,
+    };
+    println!("seed {}, {} cases in {}", set.seed, set.cases, set.out.display());
+    let text = set.run(arguments.score.then(|| policyc(arguments)).as_deref())?;
+    if arguments.score {
+        println!("\n{text}");
+    }
+    Ok(())
+}
+
 fn planned(arguments: &Arguments, index: usize) -> Result<Plan, String> {
     let extent = if arguments.short { Extent::Short } else { Extent::Full };
     match &arguments.only {
-        None => Ok(plan(arguments.seed, index, extent)),
+        None => Ok(plan(arguments.seed(), index, extent)),
         Some(text) => {
             let ids: Vec<&str> = text.split(',').filter(|id| *id != "none").collect();
-            plan_of(arguments.seed, index, &ids, extent).ok_or_else(|| format!("--only {text}: no such effect"))
+            plan_of(arguments.seed(), index, &ids, extent).ok_or_else(|| format!("--only {text}: no such effect"))
         }
     }
 }
@@ -79,7 +147,7 @@ fn generate(arguments: &Arguments) -> Result<(), String> {
     create(&cases)?;
     println!(
         "seed {}, {} cases in {}",
-        arguments.seed,
+        arguments.seed(),
         arguments.cases,
         cases.display()
     );
@@ -125,7 +193,7 @@ fn case(arguments: &Arguments, cases: &Path, index: usize) -> Result<String, Str
         let truth: Truth = serde_json::from_str(&text).map_err(|error| format!("{}: {error}", folder.display()))?;
         let hidden: Vec<&str> = truth.effects.iter().map(|hidden| hidden.id.as_str()).collect();
         let wanted: Vec<&str> = plan.effects.iter().map(|effect| effect.id).collect();
-        return match truth.seed == arguments.seed && hidden == wanted {
+        return match truth.seed == arguments.seed() && hidden == wanted {
             true => Ok("is there".to_owned()),
             false => Err(format!("{} is a case of another set", folder.display())),
         };
@@ -145,12 +213,7 @@ fn case(arguments: &Arguments, cases: &Path, index: usize) -> Result<String, Str
 
 /// Diagnoses every case, one after the other, and writes the score.
 fn score(arguments: &Arguments) -> Result<(), String> {
-    let beside = || Some(std::env::current_exe().ok()?.with_file_name("policyc"));
-    let policyc = arguments
-        .policyc
-        .clone()
-        .or_else(beside)
-        .unwrap_or_else(|| "policyc".into());
+    let policyc = policyc(arguments);
     let (mut judged, mut loops) = (Vec::new(), Vec::new());
     for index in 0..arguments.cases {
         let name = format!("case_{index:03}");
@@ -173,7 +236,7 @@ fn score(arguments: &Arguments) -> Result<(), String> {
         }
         judged.push((name, judge(&truth, &diagnosis)));
     }
-    let mut text = table(arguments.seed, &judged);
+    let mut text = table(arguments.seed(), &judged);
     if !loops.is_empty() {
         text.push_str(&closed_table(&loops));
     }

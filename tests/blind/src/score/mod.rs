@@ -9,4 +9,5 @@ pub mod table;
 pub use closed::{Closed, closed_table};
 pub use diagnosis::Diagnosis;
 pub use judge::{Judgement, judge};
+pub use statistics::{interval, median};
 pub use table::table;

@@ -32,11 +32,7 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
         (report::Verdict::Pass | report::Verdict::Note, true) => report::Verdict::Warn,
         (mark, _) => mark,
     };
-    page = page.verdict_as(
-        mark,
-        word(findings.verdict),
-        headline(diagnosis, &list),
-    );
+    page = page.verdict_as(mark, word(findings.verdict), headline(diagnosis, &list));
     if !list.is_empty() {
         page = page.section(comparison::section(&list));
     }

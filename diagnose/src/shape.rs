@@ -2,6 +2,7 @@
 
 use crate::capture::left;
 use crate::fit::State;
+use crate::ideal::{self, Ideal};
 use crate::level::ACCURACY;
 use crate::noise::{self, BLOCK, channel};
 use crate::problem::Problem;
@@ -157,9 +158,8 @@ fn followed(problem: &Problem, (index, n): (usize, usize), values: &[f64]) -> St
 
 /// Whether the inductor current rests within the period of a row.
 fn is_at_rest(problem: &Problem, record: &Record, row: usize) -> bool {
-    let p = &problem.base.plant.converter;
-    let v = record.duty[row] * p.v_in * record.v_in_ratio;
-    noise::is_discontinuous(record, row, v, v * (1.0 - record.duty[row]) / (p.inductance * p.f_sw))
+    let (ideal, duty) = (Ideal::of(record, &problem.base.plant), record.duty[row]);
+    ideal.inductor(ideal::drawn(&record.load[row], ideal.volts(duty)), duty) < ideal.half(duty)
 }
 
 /// Twenty neighbouring rows that hold most of the power.

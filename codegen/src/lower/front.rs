@@ -10,7 +10,7 @@
 //! The one invariant: every operation is one rounding of the contract, in its order, and none of them depends on a flag, so
 //! the number of executed instructions does not depend on the measurement.
 
-use policy::{Estimate, Expr, Factor, Feature, Filter, Head, Input, Policy, Residual, Scalar, Still};
+use policy::{Estimate, Expr, Factor, Feature, Filter, Head, Input, Policy, Scalar, Still};
 
 use crate::program::{Block, Front, Literal, Op, Push, ValueId};
 

@@ -1,8 +1,8 @@
 //! What is settled of records before they are a problem: their source, magnitudes, and pieces of unstable ones.
 
-use crate::ideal::Ideal;
 use crate::causes::Bases;
 use crate::drive::Model;
+use crate::ideal::Ideal;
 use crate::median::median;
 use crate::record::Record;
 

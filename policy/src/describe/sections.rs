@@ -2,8 +2,8 @@
 
 use crate::describe::formula::formula;
 use crate::model::{
-    Circuit, Continuous, Estimate, Factor, Fallback, Head, Input, InputVoltage, Interval, Mapping, Observer, OnTime, Policy,
-    Residual, Schedule, Squash, Still,
+    Circuit, Continuous, Estimate, Factor, Fallback, Head, Input, InputVoltage, Interval, Mapping, Observer, OnTime,
+    Policy, Residual, Schedule, Squash, Still,
 };
 
 /// Characters of a line of actions, with which it still fits into a terminal beside its indentation.

@@ -122,12 +122,7 @@ pub(crate) fn read(
 ///
 /// # Errors
 /// The faults that a contract which names the file would meet.
-pub fn golden_fits(
-    name: &FileName,
-    bytes: Vec<u8>,
-    inputs: usize,
-    outputs: usize,
-) -> Result<(), Faults> {
+pub fn golden_fits(name: &FileName, bytes: Vec<u8>, inputs: usize, outputs: usize) -> Result<(), Faults> {
     let file = Binary {
         name: name.clone(),
         bytes,

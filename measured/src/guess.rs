@@ -172,7 +172,7 @@ fn placed(name: &str) -> Option<&'static str> {
         let is_of = |known: &&str| *known == rest || rest.strip_suffix('s') == Some(*known) && known.len() > 3;
         PLACES
             .iter()
-            .find(|(_, words)| words.iter().any(|word| is_of(word)))
+            .find(|(_, words)| words.iter().any(is_of))
             .map(|(place, _)| *place)
     };
     let pairs = KINDS

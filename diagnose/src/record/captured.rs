@@ -30,12 +30,7 @@ impl Raw<'_> {
         if map.settled == Some(false) || !is_capture(t_sw / step, span / t_sw) {
             return Ok(None);
         }
-        if parameters.converter.topology != Topology::Buck {
-            let message = Message::new("captures are read of a buck alone")
-                .found(format!("a model of a {}", parameters.converter.topology.word()))
-                .hint("a record of one row for each period, or of settled points, is diagnosed for every topology");
-            return Err(self.sheet.fault(message).into());
-        }
+        self.needs_buck(parameters)?;
         let duty = self.still("duty")?;
         let load = self.still_load()?;
         // the first of rows that repeat a time
@@ -55,15 +50,12 @@ impl Raw<'_> {
             load,
             v_in: map.constant("v_in").unwrap_or(parameters.converter.v_in),
         };
-        let (count, all) = (samples.time.len(), time.len());
+        let unused = time.len() - samples.time.len();
         let found = read(samples, parameters).map_err(|message| self.sheet.fault(message))?;
         let mut repairs = self.repairs.clone();
-        if count < all {
-            repairs.push(format!(
-                "{} rows behind the first {MOST_PERIODS} periods are not used",
-                all - count
-            ));
-        }
+        let count = time.len() - unused;
+        let left_out = || format!("{unused} rows behind the first {MOST_PERIODS} periods are not used");
+        repairs.extend((unused > 0).then(left_out));
         repairs.push(format!(
             "read as a capture: {count} rows over {:.0} whole periods of {}",
             found.capture.bins.periods,
@@ -108,6 +100,18 @@ impl Raw<'_> {
         };
         self.doubts(&record, parameters).propagate()?;
         Ok(Some(record))
+    }
+
+    /// What a capture is read off are formulas of the buck.
+    fn needs_buck(&self, parameters: &Parameters) -> Result<(), Faults> {
+        let topology = parameters.converter.topology;
+        if topology == Topology::Buck {
+            return Ok(());
+        }
+        let message = Message::new("captures are read of a buck alone")
+            .found(format!("a model of a {}", topology.word()))
+            .hint("a record of one row for each period, or of settled points, is diagnosed for every topology");
+        Err(self.sheet.fault(message).into())
     }
 
     /// Sizes and signs of a capture that no bench has.

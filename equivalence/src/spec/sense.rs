@@ -99,7 +99,7 @@ pub(crate) fn sense(spec: Spec<'_>, state: &State, measurement: &[Term]) -> Sens
 }
 
 /// What a law of control says before the network does (sections 7c and 8).
-fn law(spec: Spec<'_>, state: &State, estimates: &[[Term; 3]], sensed: &mut Sensed) {
+fn law(spec: Spec<'_>, state: &State, estimates: &[[Term; 4]], sensed: &mut Sensed) {
     let (terms, float) = (spec.terms, spec.float);
     let of = |own: &policy::Source| source(spec, &own.tree, state, &sensed.signals, estimates);
     let is_still = |zone: &[policy::Still]| {

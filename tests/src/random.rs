@@ -130,7 +130,7 @@ fn contract(rng: &mut SplitMix, seed: u64, [features, actions, hidden]: [usize; 
     let _ = writeln!(text, "hidden_activation = [{}]\n", activations.join(", "));
     match head {
         Head::Continuous(head) => drop(writeln!(text, "[actions]\n{head}\n")),
-        Head::Gains(mut own, count) => text += &gains(&mut own, count, [features, observers, signals]),
+        Head::Gains(mut own, count) => text += &gains(&mut own, count, &observers, [features, signals]),
         Head::Choice => {
             let mut table = String::new();
             action_table(&mut table, rng, actions);
@@ -314,8 +314,8 @@ fn continuous(rng: &mut SplitMix) -> String {
 const SCHEDULE: u64 = 0x6761_696e_7300_0000;
 
 /// Gains of every map and factor, with and without limits, base and dead zone.
-fn gains(rng: &mut SplitMix, count: usize, [features, observers, signals]: [usize; 3]) -> String {
-    let seen = |rng: &mut SplitMix| match observers > 0 && rng.one_in(2) {
+fn gains(rng: &mut SplitMix, count: usize, observers: &[bool], [features, signals]: [usize; 2]) -> String {
+    let seen = |rng: &mut SplitMix| match !observers.is_empty() && rng.one_in(2) {
         true => estimate(rng, observers, signals),
         false => source(rng, signals),
     };

@@ -365,13 +365,11 @@ fn golden_answers_of_another_network_are_refused_with_the_way_out() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let twelve = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/buck12/golden.safetensors");
-    for (model, foreign, words) in [("sb3_dqn.zip", twelve.clone(), "tensor `q`")] {
-        std::fs::copy(fixture(model), path("model.zip")).unwrap();
-        std::fs::copy(foreign, path("golden.safetensors")).unwrap();
-        let text = refusal(&path("model.zip"));
-        assert!(text.contains(words), "{model}: {text}");
-        assert!(text.contains("move that of another network away"), "{model}: {text}");
-    }
+    std::fs::copy(fixture("sb3_dqn.zip"), path("model.zip")).unwrap();
+    std::fs::copy(twelve, path("golden.safetensors")).unwrap();
+    let text = refusal(&path("model.zip"));
+    assert!(text.contains("tensor `q`"), "{text}");
+    assert!(text.contains("move that of another network away"), "{text}");
 }
 
 #[test]

@@ -135,6 +135,7 @@ fn another_carrier_is_seen_before_any_search_at_any_instant() {
 
 /// What is wrong is another thing.
 #[test]
+#[allow(clippy::too_many_lines, reason = "a table of faults, one after the other")]
 fn no_other_fault_is_taken_for_a_carrier() {
     let random = &mut Noise(8);
     let good = Bench::default();

@@ -133,10 +133,8 @@ fn another_carrier_is_seen_before_any_search_at_any_instant() {
     }
 }
 
-/// What is wrong is another thing.
-#[test]
-fn no_other_fault_is_taken_for_a_carrier() {
-    let random = &mut Noise(8);
+/// Faults that are none of the carrier, by their names.
+fn other_faults() -> Vec<(String, Bench)> {
     let good = Bench::default();
     let mut cases: Vec<(String, Bench)> = Vec::new();
     let mut add = |name: &str, bench: Bench| cases.push((name.to_owned(), bench));
@@ -188,6 +186,14 @@ fn no_other_fault_is_taken_for_a_carrier() {
             },
         );
     }
+    cases
+}
+
+/// What is wrong is another thing.
+#[test]
+fn no_other_fault_is_taken_for_a_carrier() {
+    let random = &mut Noise(8);
+    let cases = other_faults();
     // a tie is said in a note, and rarely
     let mut perhaps = 0;
     for (word, on) in WHERE {
@@ -210,7 +216,7 @@ fn no_other_fault_is_taken_for_a_carrier() {
             let bench = Bench {
                 carrier: on,
                 sampled: 0.5,
-                ..good.clone()
+                ..Bench::default()
             };
             let mut table = stepped(&bench, random);
             table.column("t").iter_mut().for_each(|t| *t += late / bench.f_sw);

@@ -133,8 +133,11 @@ fn another_carrier_is_seen_before_any_search_at_any_instant() {
     }
 }
 
-/// Faults that are none of the carrier, by their names.
-fn other_faults() -> Vec<(String, Bench)> {
+/// What is wrong is another thing.
+#[test]
+#[allow(clippy::too_many_lines, reason = "a table of faults, one after the other")]
+fn no_other_fault_is_taken_for_a_carrier() {
+    let random = &mut Noise(8);
     let good = Bench::default();
     let mut cases: Vec<(String, Bench)> = Vec::new();
     let mut add = |name: &str, bench: Bench| cases.push((name.to_owned(), bench));
@@ -186,14 +189,6 @@ fn other_faults() -> Vec<(String, Bench)> {
             },
         );
     }
-    cases
-}
-
-/// What is wrong is another thing.
-#[test]
-fn no_other_fault_is_taken_for_a_carrier() {
-    let random = &mut Noise(8);
-    let cases = other_faults();
     // a tie is said in a note, and rarely
     let mut perhaps = 0;
     for (word, on) in WHERE {
@@ -216,7 +211,7 @@ fn no_other_fault_is_taken_for_a_carrier() {
             let bench = Bench {
                 carrier: on,
                 sampled: 0.5,
-                ..Bench::default()
+                ..good.clone()
             };
             let mut table = stepped(&bench, random);
             table.column("t").iter_mut().for_each(|t| *t += late / bench.f_sw);

@@ -87,6 +87,8 @@ pub fn edited(
 fn replaced(line: &str, parameter: &Parameter, after: &Parameters, notes: &BTreeMap<&'static str, String>) -> String {
     let (left, right) = line.split_once('=').unwrap_or((line, ""));
     let comment = right.split_once('#').map_or("", |(_, comment)| comment.trim());
+    // the unit is said before
+    let comment = if comment == parameter.unit { "" } else { comment };
     with_note(
         &format!("{left}= {}", value(parameter, parameter.get(after))),
         parameter,
@@ -113,7 +115,7 @@ mod tests {
     use super::edited;
 
     const TEXT: &str = "# my bench\n[converter]\nv_in = 200.0 # supply at 3 o'clock\ninductance = 2e-3\ncapacitance = 150e-6  # two in parallel\n\
-        f_sw = 10e3\n\n# measured by Eva\n[inductor]\ndcr = 0.1\n\n[pwm]\ncarrier = \"centre\"\n";
+        f_sw = 10e3\n\n# measured by Eva\n[inductor]\ndcr = 0.1 # ohm\n\n[pwm]\ncarrier = \"centre\"\n";
 
     #[test]
     fn order_and_comments_stay_and_new_numbers_go_into_their_tables() {
@@ -130,7 +132,7 @@ mod tests {
                 "150e-6  # two in parallel",
                 "0.00012  # F; was 0.00015; two in parallel",
             )
-            .replace("dcr = 0.1", "dcr = 0.3  # ohm")
+            .replace("dcr = 0.1 # ohm", "dcr = 0.3  # ohm")
             .replace("\"centre\"\n", "\"leading\"  # 1\nsampling_phase = 0.25  # 1\n")
             + "\n[capacitor]\nesr = 0.05  # ohm\n";
         assert_eq!(made, wanted);

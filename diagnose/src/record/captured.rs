@@ -17,6 +17,15 @@ const STILL: f64 = 0.01;
 /// Periods of a capture that are used: a steady state repeats itself, and noise is a seventh of that of one period.
 const MOST_PERIODS: f64 = 50.0;
 
+/// The rows of the periods that are used, of those that repeat a time the first.
+fn kept(time: &[f64], t_sw: f64) -> Vec<usize> {
+    let mut kept: Vec<usize> = (0..time.len()).collect();
+    kept.dedup_by(|b, a| time[*b] == time[*a]);
+    let end = time.first().copied().unwrap_or(0.0) + MOST_PERIODS * t_sw;
+    kept.retain(|n| time[*n] < end);
+    kept
+}
+
 impl Raw<'_> {
     /// The capture that this table is; nothing if it is another record.
     pub fn captured(&mut self, map: &ColumnMap, parameters: &Parameters) -> Result<Option<Record>, Faults> {
@@ -33,11 +42,7 @@ impl Raw<'_> {
         self.needs_buck(parameters)?;
         let duty = self.still("duty")?;
         let load = self.still_load()?;
-        // the first of rows that repeat a time
-        let mut kept: Vec<usize> = (0..time.len()).collect();
-        kept.dedup_by(|b, a| time[*b] == time[*a]);
-        let end = time.first().copied().unwrap_or(0.0) + MOST_PERIODS * t_sw;
-        kept.retain(|n| time[*n] < end);
+        let kept = kept(&time, t_sw);
         let pick = |values: Vec<f64>| kept.iter().map(|n| values[*n]).collect::<Vec<f64>>();
         let samples = Samples {
             step,

@@ -17,6 +17,10 @@ pub const FARTHEST: f64 = 1.0;
 /// A direction shorter than this is not seen.
 // in standard deviations, of which a nudge makes one and more: what is left this short is rounding
 const UNSEEN: f64 = 1e-6;
+/// Nor is one of which the others leave less than this share: a nudge bends by as much ([`NUDGE`]). Where the current rests in every
+/// period, initial voltage and current are one charge, and what tells them apart is 2e-4 of it; a step along that would run to
+/// thousands of amperes, and take down with it all that is estimated beside it.
+const APART: f64 = 1e-3;
 
 /// An orthonormal basis of what initial states and free load steps can explain, for each segment.
 #[derive(Debug, Clone)]
@@ -184,12 +188,13 @@ impl Span {
     /// Takes a column in: what the others before it do not hold, at length 1.
     fn add(&mut self, mut column: Vec<f64>) {
         let mut r = Vec::with_capacity(self.q.len() + 1);
+        let least = UNSEEN.max(APART * dot(&column, &column).sqrt());
         for q in &self.q {
             let share = dot(q, &column);
             axpy(&mut column, -share, q);
             r.push(share);
         }
-        r.push(normalise(&mut column, UNSEEN));
+        r.push(normalise(&mut column, least));
         self.q.push(column);
         self.r.push(r);
     }

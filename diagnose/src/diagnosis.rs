@@ -120,7 +120,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         set_aside,
         empirical: empirical.as_ref().map(|term| term.findings.clone()),
         structure: found.structure.iter().chain(&found.lines).cloned().collect(),
-        residuals: whiteness::of(&found.problem, &found.attribution.null, found.attribution.state()),
+        residuals: whiteness::of(&found.problem, found.attribution.state()),
         doubts: doubts::said(&found.doubts),
         not_detectable: answer.not_detectable,
         next_experiments: answer.next_experiments,

@@ -9,7 +9,7 @@ use crate::compared::Compared;
 use crate::gain::{Held, Shift};
 use crate::rivals::RivalValue;
 use crate::shape::Structure;
-use crate::whiteness::Whiteness;
+use crate::whiteness::Driven;
 use crate::worth::Worth;
 
 /// The answer in a word.
@@ -170,7 +170,7 @@ pub struct Findings {
     /// Structure that is left.
     pub structure: Vec<Structure>,
     /// How well each channel of the training records is fitted, and whether the rest is noise.
-    pub residuals: Vec<Whiteness>,
+    pub residuals: Vec<Driven>,
     /// Why causes are no explanation although they leave no structure, in words.
     pub doubts: Vec<String>,
     /// Causes that would have to be large to be seen.

@@ -74,7 +74,7 @@ pub struct Record {
     pub dense: bool,
     /// Stretches to simulate.
     pub segments: Vec<Segment>,
-    /// Rows of load steps whose instant in the period is estimated beside every fit ([`crate::instants`]).
+    /// Rows of load steps whose instant in the period is estimated beside every fit (docs/decisions/0007-instants-of-load-steps.md).
     pub free_steps: Vec<usize>,
     /// A few periods at the rate of an oscilloscope, of which the one row holds duty and load ([`crate::capture`]).
     pub capture: Option<Box<Capture>>,

@@ -1,6 +1,5 @@
-//! How well the model fits each channel of the training records, and whether what it leaves is noise, as figures.
+//! Whether what a model leaves is noise, as figures; how large it is stands in the table of fits (`page::comparison`).
 //!
-//! - The fit is 100 % less the error over the scatter of the signal, as in identification at large.
 //! - Ljung and Box's sum over the correlations of a residual with itself tells colour: for white noise it is a chi-square.
 //! - The correlation with duty and load, some rows later, tells what of these the model does not carry on.
 //!
@@ -29,21 +28,13 @@ pub struct Largest {
     pub lag: usize,
 }
 
-/// Figures of one channel of one record.
+/// What the residual of one channel of one record still has of what drives the converter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Whiteness {
+pub struct Driven {
     /// Record.
     pub record: String,
     /// Channel.
     pub channel: &'static str,
-    /// Fit without and with what was found, %.
-    pub fit: [f64; 2],
-    /// Mean square over that of the noise, without and with what was found.
-    pub mean_square: [f64; 2],
-    /// Ljung and Box's sum over twenty lags.
-    pub ljung_box: f64,
-    /// Chance that white noise has more.
-    pub chance: f64,
     /// With the duty, if that moves.
     pub with_duty: Option<Largest>,
     /// With the set load, if that moves.
@@ -52,9 +43,9 @@ pub struct Whiteness {
     pub band: f64,
 }
 
-/// The figures of all channels of records over time; `null` is the model as given.
+/// The figures of all channels of records over time.
 #[must_use]
-pub fn of(problem: &Problem, null: &State, state: &State) -> Vec<Whiteness> {
+pub fn of(problem: &Problem, state: &State) -> Vec<Driven> {
     let mut list = Vec::new();
     for (index, record) in problem.records.iter().enumerate() {
         if record.settled || record.capture.is_some() {
@@ -62,28 +53,18 @@ pub fn of(problem: &Problem, null: &State, state: &State) -> Vec<Whiteness> {
         }
         for (n, name) in CHANNEL_NAMES.iter().enumerate().take(CHANNELS) {
             let left = channel(problem, &state.residual, index, n);
-            let before = channel(problem, &null.residual, index, n);
             let rows: Vec<usize> = (0..left.len()).filter(|row| left[*row] != 0.0).collect();
             if rows.len() < FEWEST {
                 continue;
             }
-            let signal: Vec<f64> = rows
-                .iter()
-                .map(|row| record.measured[n][*row] / problem.sigma[n])
-                .collect();
             let pick = |values: &[f64]| rows.iter().map(|row| values[*row]).collect::<Vec<f64>>();
             let load: Vec<f64> = (record.load.iter())
                 .map(|load| load.current + load.conductance * problem.bases.v + load.power / problem.bases.v)
                 .collect();
-            let (shown, was) = (pick(&left), pick(&before));
-            let (ljung_box, chance) = ljung_box(&shown);
-            list.push(Whiteness {
+            let shown = pick(&left);
+            list.push(Driven {
                 record: record.name.clone(),
                 channel: name,
-                fit: [&was, &shown].map(|left| fit(&signal, left)),
-                mean_square: [&was, &shown].map(|left| left.iter().map(|v| v * v).sum::<f64>() / left.len() as f64),
-                ljung_box,
-                chance,
                 with_duty: largest(&shown, &pick(&record.duty)),
                 with_load: largest(&shown, &pick(&load)),
                 band: BAND / (rows.len() as f64).sqrt(),
@@ -91,14 +72,6 @@ pub fn of(problem: &Problem, null: &State, state: &State) -> Vec<Whiteness> {
         }
     }
     list
-}
-
-/// 100 % less the error over the scatter of the signal.
-fn fit(signal: &[f64], left: &[f64]) -> f64 {
-    let mean = signal.iter().sum::<f64>() / signal.len() as f64;
-    let scatter: f64 = signal.iter().map(|v| (v - mean) * (v - mean)).sum();
-    let error: f64 = left.iter().map(|v| v * v).sum();
-    100.0 * (1.0 - (error / scatter.max(f64::MIN_POSITIVE)).sqrt())
 }
 
 fn centred(values: &[f64]) -> Vec<f64> {
@@ -110,8 +83,15 @@ fn lagged(a: &[f64], b: &[f64], lag: usize) -> f64 {
     a.iter().skip(lag).zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The sum and the chance that white noise has more (Wilson and Hilferty's normal number of a chi-square).
-fn ljung_box(values: &[f64]) -> (f64, f64) {
+/// The chance that white noise resembles itself more than these errors, which are 0 where nothing counts; nothing with too few.
+#[must_use]
+pub fn white_chance(errors: &[f64]) -> Option<f64> {
+    let values: Vec<f64> = errors.iter().copied().filter(|error| *error != 0.0).collect();
+    (values.len() >= FEWEST).then(|| ljung_box(&values))
+}
+
+/// The chance that white noise has more of Ljung and Box's sum (Wilson and Hilferty's normal number of a chi-square).
+fn ljung_box(values: &[f64]) -> f64 {
     let (a, n) = (centred(values), values.len() as f64);
     let square = lagged(&a, &a, 0).max(f64::MIN_POSITIVE);
     let terms = (1..=LAGS).map(|lag| {
@@ -121,7 +101,7 @@ fn ljung_box(values: &[f64]) -> (f64, f64) {
     let sum = n * (n + 2.0) * terms.sum::<f64>();
     let (count, spread) = (LAGS as f64, 2.0 / (9.0 * LAGS as f64));
     let normal = (libm::cbrt(sum / count) - (1.0 - spread)) / spread.sqrt();
-    (sum, 0.5 * libm::erfc(normal / std::f64::consts::SQRT_2))
+    0.5 * libm::erfc(normal / std::f64::consts::SQRT_2)
 }
 
 /// The largest correlation of a residual with what drives the converter; nothing if that stands still.
@@ -139,7 +119,7 @@ fn largest(left: &[f64], input: &[f64]) -> Option<Largest> {
 
 #[cfg(test)]
 mod tests {
-    use super::{fit, largest, ljung_box};
+    use super::{largest, ljung_box};
 
     fn noise(count: usize, seed: u64) -> Vec<f64> {
         let mut state = seed;
@@ -154,7 +134,7 @@ mod tests {
 
     #[test]
     fn white_noise_has_a_chance_that_is_evenly_spread_and_coloured_noise_none() {
-        let chances: Vec<f64> = (0..200).map(|seed| ljung_box(&noise(300, seed + 1)).1).collect();
+        let chances: Vec<f64> = (0..200).map(|seed| ljung_box(&noise(300, seed + 1))).collect();
         for limit in [0.1, 0.5, 0.9] {
             let share = chances.iter().filter(|chance| **chance < limit).count() as f64 / 200.0;
             // three standard deviations of a share of 200
@@ -165,7 +145,7 @@ mod tests {
         }
         let white = noise(300, 5);
         let coloured: Vec<f64> = white.windows(2).map(|pair| pair[1] + 0.6 * pair[0]).collect();
-        assert!(ljung_box(&coloured).1 < 1e-3);
+        assert!(ljung_box(&coloured) < 1e-3);
     }
 
     #[test]
@@ -176,8 +156,5 @@ mod tests {
         let found = largest(&left, &input).unwrap();
         assert!(found.lag.abs_diff(5) <= 1 && found.correlation > 0.5, "{found:?}");
         assert!(largest(&left, &[1.0; 300]).is_none());
-        // an error of a tenth of the scatter
-        let tenth: Vec<f64> = input.iter().map(|v| 0.1 * (v - 0.5)).collect();
-        assert!((fit(&input, &tenth) - 90.0).abs() < 0.5, "{}", fit(&input, &tenth));
     }
 }

@@ -7,7 +7,7 @@
 //! ```
 //! times the gain of its sensor, and its offset. But for the product of R_s, that is b0 + b1 d + b2 i + b3 d i. For boost and
 //! buck-boost the inductor carries i / (1 - d), and with x = 1 / (1 - d) the same losses leave
-//! b0 + b1 x + b2 x^2 + b3 i x + b4 i x^2. Points that are not of that form need no search.
+//! b0 + b1 x + b2 x^2 + (b3 + b4 x + b5 x^2) i, b3 of a cable. Points that are not of that form need no search.
 
 use plant::Topology;
 
@@ -80,7 +80,7 @@ fn of(problem: &Problem, record: &Record) -> Option<String> {
     let (rms, name, own) = (crate::words::si(rms, "V"), &record.name, ideal.topology.word());
     let form = match ideal.topology {
         Topology::Buck => "b0 + b1 d + b2 i + b3 d i",
-        Topology::Boost | Topology::BuckBoost => "b0 + b1 x + b2 x^2 + b3 i x + b4 i x^2 with x = 1/(1 - d)",
+        Topology::Boost | Topology::BuckBoost => "b0 + b1 x + b2 x^2 + (b3 + b4 x + b5 x^2) i with x = 1/(1 - d)",
     };
     Some(format!(
         "no {own} gives the points of {name}, whatever its losses: its voltage is {form}, and theirs is {rms} beside{looks}"
@@ -100,7 +100,6 @@ fn columns(topology: Topology, points: &[Point]) -> Vec<Vec<f64>> {
         let (x, i) = (of_duty(p) - x_mean, p.2 / i_mean - 1.0);
         match topology {
             Topology::Buck => vec![1.0, x, i, x * i],
-            // i x and i x^2 around the means need i alone as well: it stands for a cable
             Topology::Boost | Topology::BuckBoost => vec![1.0, x, x * x, i, x * i, x * x * i],
         }
     };

@@ -52,37 +52,38 @@ const TRAIN: &Course = &[
 const HELD: &Course = &[(0, 0.5, 20.0), (70, 0.4, 15.0), (150, 0.45, 25.0), (220, 0.3, 20.0)];
 
 impl Circuit {
-    /// A stretch of a period by the method of the midpoint, ended early where a diode's current comes to rest.
-    fn stretch(&self, (source, output): (f64, f64), is_on: bool, time: f64, load: f64, state: &mut [f64; 2]) {
+    /// A stretch of a period, current, voltage and the integral of the voltage, by the method of the midpoint, ended early where a diode's current comes to rest.
+    fn stretch(&self, (source, output): (f64, f64), is_on: bool, time: f64, load: f64, state: &mut [f64; 3]) {
         let h = time / FINE as f64;
         for _ in 0..FINE {
             let rests = self.diode && !is_on && state[0] <= 0.0;
             let drop = if self.diode && !is_on { self.forward } else { 0.0 };
-            let slope = |[i, v]: [f64; 2]| {
+            let slope = |[i, v, _]: [f64; 3]| {
                 let volts = source * V_IN - output * v - drop - self.winding * i;
                 let charge = if rests { 0.0 } else { output * i };
                 [
                     if rests { 0.0 } else { volts / L },
                     (charge - v / load) / self.capacitance,
+                    v,
                 ]
             };
             let first = slope(*state);
-            let middle = slope([state[0] + 0.5 * h * first[0], state[1] + 0.5 * h * first[1]]);
-            *state = [state[0] + h * middle[0], state[1] + h * middle[1]];
+            let middle = slope(std::array::from_fn(|n| state[n] + 0.5 * h * first[n]));
+            *state = std::array::from_fn(|n| state[n] + h * middle[n]);
             if self.diode && !is_on {
                 state[0] = state[0].max(0.0);
             }
         }
     }
 
-    fn period(&self, duty: f64, load: f64, state: &mut [f64; 2]) {
+    fn period(&self, duty: f64, load: f64, state: &mut [f64; 3]) {
         self.stretch(self.leg[0], true, duty / F_SW, load, state);
         self.stretch(self.leg[1], false, (1.0 - duty) / F_SW, load, state);
     }
 
     /// Sampled where the switch turns on; a voltage with a noise of 20 mV, a current with one of 20 mA.
     fn record(&self, course: &Course, rows: usize, seed: u64) -> Table {
-        let (mut state, noise) = ([0.0, 0.5 * V_IN], &mut Noise(seed));
+        let (mut state, noise) = ([0.0, 0.5 * V_IN, 0.0], &mut Noise(seed));
         for _ in 0..1500 {
             self.period(course[0].1, course[0].2, &mut state);
         }
@@ -101,6 +102,28 @@ impl Circuit {
                 column.1.push(value);
             }
             self.period(*duty, *load, &mut state);
+        }
+        Table(columns.to_vec())
+    }
+}
+
+impl Circuit {
+    /// Mean voltages of settled points, of noise 20 mV.
+    fn settled(&self, seed: u64) -> Table {
+        let noise = &mut Noise(seed);
+        let mut columns = ["duty", "v_out", "r_load"].map(|name| (name.to_owned(), Vec::new()));
+        for duty in [0.2, 0.3, 0.4, 0.5, 0.55] {
+            for load in [6.0, 9.0, 14.0] {
+                let mut state = [0.0, V_IN, 0.0];
+                for _ in 0..600 {
+                    state[2] = 0.0;
+                    self.period(duty, load, &mut state);
+                }
+                let shown = [duty, state[2] * F_SW + 0.02 * noise.normal(), load];
+                for (column, value) in columns.iter_mut().zip(shown) {
+                    column.1.push(value);
+                }
+            }
         }
         Table(columns.to_vec())
     }
@@ -233,4 +256,25 @@ fn a_current_that_swings_or_rests_is_no_fault_of_its_sensor() {
         let table = Circuit { leg, diode, ..PLAIN }.record(TRAIN, 200, 4);
         table.read("run", &model("buck-boost", rectifier)).unwrap();
     }
+}
+
+#[test]
+fn settled_points_of_a_boost_are_explained_and_exchanged_ones_are_no_boosts() {
+    let model = model("boost", "synchronous");
+    let mut table = Circuit { winding: 0.1, ..PLAIN }.settled(6);
+    let record = table.read("points", &model).unwrap();
+    let findings = diagnose(&model, vec![record], &[], &|_| ()).findings;
+    assert_eq!(findings.verdict, Verdict::Ambiguous, "{}", findings.sentence);
+    assert!(findings.sentence.contains("dcr"), "{}", findings.sentence);
+    // volts of other duties: still those of a boost, each alone
+    table.column("v_out").swap(0, 9);
+    table.column("v_out").swap(2, 13);
+    let record = table.read("points", &model).unwrap();
+    let findings = diagnose(&model, vec![record], &[], &|_| ()).findings;
+    assert_eq!(findings.verdict, Verdict::Unexplained, "{}", findings.sentence);
+    assert!(
+        findings.sentence.contains("no boost gives the points"),
+        "{}",
+        findings.sentence
+    );
 }

@@ -145,7 +145,7 @@ impl Defect {
 /// All of them, in a plain run, too: an edit of a template must not leave a defect that is planted nowhere.
 #[test]
 fn every_defect_has_one_place_in_the_emitted_code() {
-    let mut emitted = [ADC, FILTERS, LINEAR].map(|policy| (policy, Code::of(&load(policy))));
+    let mut emitted = [ADC, FILTERS, LINEAR, GAINS].map(|policy| (policy, Code::of(&load(policy))));
     let mut lost = Vec::new();
     for defect in &DEFECTS {
         let (_, code) = emitted.iter_mut().find(|(policy, _)| *policy == defect.policy).unwrap();

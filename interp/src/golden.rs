@@ -45,7 +45,7 @@ pub struct GoldenResult {
 
 impl GoldenResult {
     /// All duties, or all Q values within the tolerance, or all actions equal where the trainer gave no Q values; or rounded. With Q values
-    /// the actions are [`Decisions`], which know ties.
+    /// the actions are [`crate::decisions::Decisions`], which know ties.
     #[must_use]
     pub fn passed(&self) -> bool {
         let actions = self.actions_equal == self.actions_compared;
@@ -187,7 +187,7 @@ fn relative_error(expected: &[f32], got: &[f64]) -> f64 {
 /// The interpreter's answers against the trainer's; `None` without golden vectors.
 ///
 /// A network in integers is judged in binary32: how it was read is the question here, what rounding costs that of
-/// [`decisions`].
+/// [`crate::decisions`].
 #[must_use]
 pub fn golden_result(policy: &Policy) -> Option<GoldenResult> {
     let golden = policy.golden.as_ref()?;

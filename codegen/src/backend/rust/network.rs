@@ -68,12 +68,25 @@ pub fn choice(program: &Program) -> Choice {
         };
     }
     if program.head.is_gains() {
+        let body = match &program.network.arithmetic {
+            Arithmetic::Real { .. } => quote!(network(observation)),
+            Arithmetic::Integer(code) => {
+                let each = program.head.curves().iter().enumerate().map(|(n, _)| {
+                    let n = size(n);
+                    integer::number(code, program.has_fpu, &quote!(outputs[#n]))
+                });
+                quote! {
+                    let outputs = network(observation);
+                    [#(#each),*]
+                }
+            }
+        };
         return Choice {
             about: " Network: its outputs.",
             about_apart: " The network's outputs for a measurement, with a stack of its own.",
             kind: quote!([#kind; ACTIONS]),
             name: quote!(outputs),
-            body: quote!(Self::q_values(observation)),
+            body,
             index: quote!(0),
         };
     }

@@ -571,7 +571,7 @@ impl Controller {
     /// Network: its outputs.
     #[inline(always)]
     fn choose(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
-        Self::q_values(observation)
+        network(observation)
     }
     /// Mapping, limits, status.
     #[inline(always)]

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 /// The folder is named by this variable.
 const FOLDER: &str = "POLICYC_STUDIO";
+/// What a page runs.
+const MODULES: [&str; 3] = ["studio.wasm", "code.wasm", "records.wasm"];
 
 fn main() -> Result<(), String> {
     println!("cargo::rerun-if-env-changed={FOLDER}");
@@ -17,10 +19,11 @@ fn main() -> Result<(), String> {
         println!("cargo::rerun-if-changed={}", folder.display());
         walk(&folder, &mut files)?;
         files.sort();
-        if !files.contains(&folder.join("studio.wasm")) {
+        let missing = MODULES.into_iter().find(|name| !files.contains(&folder.join(name)));
+        if let Some(missing) = missing {
+            let folder = folder.display();
             return Err(format!(
-                "{FOLDER}: {} holds no studio.wasm: `cargo xtask studio` makes it",
-                folder.display()
+                "{FOLDER}: {folder} holds no {missing}: `cargo xtask studio` makes it"
             ));
         }
         return write(&folder, &files);

@@ -7,6 +7,7 @@ mod campaign;
 mod commands;
 mod failure;
 mod interruption;
+mod look;
 mod made;
 mod one_of;
 mod outcome;
@@ -15,6 +16,7 @@ mod ownership;
 mod staging;
 mod studio;
 mod talk;
+mod welcome;
 
 use std::ffi::OsString;
 use std::time::Instant;
@@ -34,6 +36,11 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         && only == campaign::WORKER
     {
         return campaign::work() as u8;
+    }
+    look::choose(&arguments);
+    if arguments.len() == 1 {
+        welcome::print();
+        return 2;
     }
     made::heed(arguments.iter().skip(1).cloned());
     let arguments = match Arguments::try_parse_from(arguments) {

@@ -15,7 +15,7 @@ thread_local! {
 }
 
 /// Options that change no page: with a value, and without one.
-const WITH_VALUE: [&str; 3] = ["--out", "--report", "--threads"];
+const WITH_VALUE: [&str; 4] = ["--out", "--report", "--threads", "--color"];
 const WITHOUT_VALUE: [&str; 7] = ["--force", "--json", "--resume", "-q", "--quiet", "-v", "--verbose"];
 
 /// Options with their values.

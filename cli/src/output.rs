@@ -11,6 +11,7 @@ use toml_input::Message;
 
 use crate::failure::Failure;
 use crate::interruption;
+use crate::look;
 use crate::ownership::{self, Replacing};
 use crate::staging::{self, Staged};
 use crate::talk;
@@ -197,7 +198,7 @@ pub fn say(text: &str) -> Result<(), Failure> {
     match talk::heard(text) {
         // it was a note and nothing else
         heard if heard.is_empty() && !text.is_empty() => Ok(()),
-        heard => print(&format!("{heard}\n")),
+        heard => put(&look::of_answer(&format!("{heard}\n")), anstream::stdout().lock()),
     }
 }
 
@@ -214,12 +215,16 @@ pub fn say_json(answer: &impl Serialize) -> Result<(), Failure> {
 /// # Errors
 /// If the text cannot be written.
 pub fn print(text: &str) -> Result<(), Failure> {
+    put(text, io::stdout().lock())
+}
+
+/// [`print`]; the stream takes colours out where they do not belong, and what is kept has none.
+fn put(text: &str, mut out: impl Write) -> Result<(), Failure> {
     interruption::go_no_further_if_ending();
     if let Some(kept) = &mut *KEPT.lock().unwrap_or_else(PoisonError::into_inner) {
-        kept.push_str(text);
+        kept.push_str(&anstream::adapter::strip_str(text).to_string());
         return Ok(());
     }
-    let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         Err(error) => Err(Message::new(format!("cannot write to standard output: {error}")).into()),

@@ -5,6 +5,7 @@ use std::io::Write;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use crate::arguments::Loudness;
+use crate::look::{self, Meaning};
 
 const USUAL: u8 = 0;
 const QUIET: u8 = 1;
@@ -39,7 +40,7 @@ pub fn is_verbose() -> bool {
 pub fn tell(line: &str) {
     if !is_quiet() {
         // what cannot be told is no reason to stop
-        let _ = writeln!(std::io::stderr(), "{line}");
+        let _ = writeln!(anstream::stderr(), "{line}");
     }
 }
 
@@ -52,7 +53,15 @@ pub fn tell_more(line: impl FnOnce() -> String) {
 
 /// A note on standard error: for a command whose answer is no text.
 pub fn note(note: &str) {
-    tell(&format!("{NOTE}{note}"));
+    tell(&look::of_answer(&format!("{NOTE}{note}")));
+}
+
+/// What is not as it should be, with what to do, on standard error: an answer in a quiet run, too.
+pub fn different(problem: &str, hint: Option<&str>) {
+    let hint = hint.map(|hint| format!("\n  = {}: {hint}", look::of(Meaning::Hint, "hint")));
+    let word = look::of(Meaning::Wrong, "DIFFERENT");
+    // what cannot be told is no reason to stop
+    let _ = writeln!(anstream::stderr(), "\n{word}: {problem}{}", hint.unwrap_or_default());
 }
 
 /// The notes of an answer, without the word.

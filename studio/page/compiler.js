@@ -48,6 +48,11 @@ export class Compiler {
     return { ...answer, made };
   }
 
+  /// Fetches what will answer a request, while nobody waits for it yet.
+  prepare(request) {
+    this.send({ fetch: request }).catch(() => {});
+  }
+
   /// Ends whatever is being done.
   stop() {
     this.worker.terminate();

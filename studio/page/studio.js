@@ -8,6 +8,8 @@ import { Records } from "./records.js";
 import { whole } from "./simulate.js";
 
 const VIEWS = ["contract", "code", "map", "loop", "records"];
+/// What a view will ask that is fetched apart.
+const LATER = { code: "compile", records: "diagnose" };
 
 /// What a file is for, by its name and content.
 function kind(path, content) {
@@ -106,6 +108,7 @@ class Studio {
       at(`tab-${name}`).tabIndex = name === view ? 0 : -1;
       at(`panel-${name}`).hidden = name !== view;
     }
+    if (LATER[view]) this.compiler.prepare(LATER[view]);
     this.refresh();
   }
 

@@ -1,50 +1,7 @@
-//! Requests and the parts of answers that several share.
+//! What several requests and answers share.
 
 use serde::{Deserialize, Serialize};
 use toml_input::Faults;
-
-/// What the page asks. Files are paths among those of the session.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(tag = "ask", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Request {
-    /// What there is to choose from: formats, outputs, targets, numbers of a plant.
-    Choices,
-    /// The contract as `policyc inspect` prints it, or its faults.
-    Read(Contract),
-    /// A contract for a file of a trainer, as `policyc new` would write it.
-    New {
-        /// What the trainer saved.
-        file: String,
-        /// Path of the contract.
-        contract: String,
-        /// Actions, where the file does not say how many.
-        actions: Option<usize>,
-    },
-    /// The files of `policyc compile --no-costs`.
-    Compile {
-        /// The contract.
-        #[serde(flatten)]
-        of: Contract,
-        /// Names of outputs.
-        emit: Vec<String>,
-        /// Name of the target.
-        target: String,
-    },
-    /// The policy's duty over two signals.
-    Map(crate::map::Wanted),
-    /// A load step in closed loop, quickly.
-    Loop(crate::loops::Step),
-    /// The files of `policyc simulate`.
-    Simulate {
-        /// The contract.
-        #[serde(flatten)]
-        of: Contract,
-        /// The scenario.
-        scenario: String,
-    },
-    /// The files of `policyc diagnose`.
-    Diagnose(crate::records::Wanted),
-}
 
 /// A contract, in a numeric format of its own or another one.
 #[derive(Debug, Clone, Deserialize)]

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use codegen::Output;
 use policy::{NumericFormat, Policy, ReadOptions};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use toml_input::{Faults, messages};
 
 use crate::answer::Contract;
-use crate::session::{Reply, Session};
+use crate::session::{self, Reply, Session, Tell};
 
 /// The checked policy.
 pub(crate) fn load(session: &Session, of: &Contract) -> Result<Policy, Faults> {
@@ -45,7 +46,7 @@ struct Parameter {
 }
 
 /// What there is to choose from.
-pub(crate) fn choices() -> Result<Reply, Faults> {
+pub(crate) fn choices(_: &Session, _: &Value, _: Tell) -> Result<Reply, Faults> {
     // an FMU holds a binary that a compiler of this machine makes
     let outputs = Output::ALL
         .iter()
@@ -82,8 +83,8 @@ struct Shown<'p> {
 }
 
 /// The contract as `inspect` shows it.
-pub(crate) fn read(session: &Session, of: &Contract) -> Result<Reply, Faults> {
-    let policy = load(session, of)?;
+pub(crate) fn read(session: &Session, request: &Value, _: Tell) -> Result<Reply, Faults> {
+    let policy = load(session, &session::read(request)?)?;
     Reply::of(&Shown {
         inspect: verify::text::inspection(&policy).trim_end().to_owned() + "\n",
         different: different(&policy),
@@ -109,19 +110,35 @@ fn different(policy: &Policy) -> Option<String> {
     (!kept).then(|| "the numeric format changes more of the trainer's decisions than the contract allows".to_owned())
 }
 
+/// A contract for a file of a trainer, as `policyc new` would write it.
+#[derive(Deserialize)]
+struct Model {
+    /// What the trainer saved.
+    file: String,
+    /// Path of the contract.
+    contract: String,
+    /// Actions, where the file does not say how many.
+    actions: Option<usize>,
+}
+
 #[derive(Serialize)]
 struct New {
     said: Vec<String>,
 }
 
 /// A contract for what a trainer saved, and what lies beside it.
-pub(crate) fn new(session: &Session, file: &str, contract: &str, actions: Option<usize>) -> Result<Reply, Faults> {
+pub(crate) fn new(session: &Session, request: &Value, _: Tell) -> Result<Reply, Faults> {
+    let Model {
+        file,
+        contract,
+        actions,
+    } = session::read(request)?;
     let options = import::Options {
         actions,
         ..import::Options::default()
     };
-    let contract = Path::new(contract);
-    let new = import::new_policy(session.named(file), contract, &options)?;
+    let contract = Path::new(&contract);
+    let new = import::new_policy(session.named(&file), contract, &options)?;
     let beside = |name: &str| contract.with_file_name(name).display().to_string();
     let mut made: std::collections::BTreeMap<_, _> = new
         .beside

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! Session::put(name, bytes) ─► Files ─┐
-//! Session::ask(request) ──► Request ──┴─► read, new, compile, map, loop, simulate, diagnose ─► answer
+//! Session::ask(request) ──► Part ─────┴─► read, new, compile, map, loop, simulate, diagnose ─► answer
 //!                                            the libraries that the commands call           └─► made files: Session::made
 //! ```
 //!
@@ -14,8 +14,9 @@ mod code;
 mod contract;
 mod loops;
 mod map;
+mod part;
 mod records;
 mod session;
 
-pub use answer::Request;
+pub use part::{CODE, FIRST, Part, RECORDS};
 pub use session::Session;

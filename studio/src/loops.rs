@@ -9,18 +9,16 @@ use closed_loop::{Course, LoadKind, LoadStep, Named, Scenario, interpreter};
 use plant::Parameters;
 use policy::Policy;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use toml_input::{Faults, Message, messages};
 
 use crate::answer::Contract;
 use crate::contract::load;
-use crate::session::{Reply, Session, Tell, texts};
+use crate::session::{Reply, Session, Tell, read, texts};
 
 /// A load step at a plant.
-#[derive(Debug, Clone, Deserialize)]
-pub struct Step {
-    /// The contract.
-    #[serde(flatten)]
-    of: Contract,
+#[derive(Deserialize)]
+struct Step {
     /// The plant's file.
     plant: String,
     /// Numbers of the plant that take the place of its file's.
@@ -93,9 +91,9 @@ impl Curve {
 }
 
 /// Load steps at one instant each.
-pub(crate) fn step(session: &Session, step: &Step) -> Result<Reply, Faults> {
-    let policy = load(session, &step.of)?;
-    let setting = setting(session, step, policy)?;
+pub(crate) fn step(session: &Session, request: &Value, _: Tell) -> Result<Reply, Faults> {
+    let policy = load(session, &read::<Contract>(request)?)?;
+    let setting = setting(session, &read(request)?, policy)?;
     let before = 20.0 * setting.policy.sample_period;
     let named = vec![interpreted(&setting.policy)?];
     let found = run(setting, named, &mut |_| Ok(()))?;
@@ -187,16 +185,24 @@ fn interpreted(policy: &Policy) -> Result<Named, Faults> {
     })
 }
 
+/// What is simulated.
+#[derive(Deserialize)]
+struct Wanted {
+    /// The scenario.
+    scenario: String,
+}
+
 #[derive(Serialize)]
 struct Simulated {
     summary: String,
 }
 
 /// All that `policyc simulate` writes.
-pub(crate) fn simulate(session: &Session, of: &Contract, scenario: &str, tell: Tell) -> Result<Reply, Faults> {
-    let read = Scenario::load(session.named(scenario))?;
-    let policy = load(session, of)?;
-    let setting = Setting::new(Path::new(scenario), read, policy, None)?;
+pub(crate) fn simulate(session: &Session, request: &Value, tell: Tell) -> Result<Reply, Faults> {
+    let Wanted { scenario: file } = read(request)?;
+    let scenario = Scenario::load(session.named(&file))?;
+    let policy = load(session, &read::<Contract>(request)?)?;
+    let setting = Setting::new(Path::new(&file), scenario, policy, None)?;
     let named = vec![interpreted(&setting.policy)?];
     let found = run(setting, named, &mut |what| {
         tell(&what.to_string());

@@ -3,21 +3,19 @@
 use closed_loop::{DecisionMap, decision_map};
 use policy::Policy;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use toml_input::{Faults, Message};
 
 use crate::answer::Contract;
 use crate::contract::load;
-use crate::session::{Reply, Session};
+use crate::session::{Reply, Session, Tell, read};
 
 /// Cells along an axis at most: more than a screen shows.
 const MOST_CELLS: usize = 400;
 
 /// A map: two axes, and what the other signals are.
-#[derive(Debug, Clone, Deserialize)]
-pub struct Wanted {
-    /// The contract.
-    #[serde(flatten)]
-    of: Contract,
+#[derive(Deserialize)]
+struct Wanted {
     /// The axis to the right.
     x: Axis,
     /// The axis upwards.
@@ -28,7 +26,7 @@ pub struct Wanted {
 }
 
 /// A signal and the values it takes.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Deserialize)]
 struct Axis {
     signal: String,
     low: f64,
@@ -63,8 +61,9 @@ struct Map {
 }
 
 /// The command of a controller that meets each measurement first: its filters begin with it, as after a long rest there.
-pub(crate) fn map(session: &Session, wanted: &Wanted) -> Result<Reply, Faults> {
-    let policy = load(session, &wanted.of)?;
+pub(crate) fn map(session: &Session, request: &Value, _: Tell) -> Result<Reply, Faults> {
+    let (of, wanted) = (read::<Contract>(request)?, read::<Wanted>(request)?);
+    let policy = load(session, &of)?;
     let axes = [wanted.x.index(&policy)?, wanted.y.index(&policy)?];
     if axes[0] == axes[1] {
         return Err(Message::new("a map needs two signals").found(&wanted.x.signal).into());

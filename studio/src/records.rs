@@ -8,14 +8,15 @@ use diagnose::record::open_all;
 use diagnose::results::{self, Asked};
 use measured::ColumnMap;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use toml_input::{Faults, FileName};
 
 use crate::loops::plant_of;
-use crate::session::{Reply, Session, Tell, texts};
+use crate::session::{Reply, Session, Tell, read, texts};
 
 /// What `policyc diagnose` is told.
-#[derive(Debug, Clone, Deserialize)]
-pub struct Wanted {
+#[derive(Deserialize)]
+struct Wanted {
     /// The plant's file.
     model: String,
     /// Records that are fitted.
@@ -39,7 +40,8 @@ struct Diagnosed {
 }
 
 /// What `policyc diagnose` writes and says.
-pub(crate) fn diagnose(session: &Session, wanted: &Wanted, tell: Tell) -> Result<Reply, Faults> {
+pub(crate) fn diagnose(session: &Session, request: &Value, tell: Tell) -> Result<Reply, Faults> {
+    let wanted = read::<Wanted>(request)?;
     let columns = wanted
         .columns
         .as_deref()

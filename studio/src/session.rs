@@ -3,19 +3,20 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use toml_input::{Faults, FileName, Files, Message};
 
-use crate::answer::{Made, Refused, Request};
-use crate::{code, contract, loops, map, records};
+use crate::answer::{Made, Refused};
+use crate::part::Part;
 
 /// Hears how far a long piece of work is.
 pub type Tell = fn(&str);
 
 /// Files of a user in memory, and what was made of them last.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Session {
+    parts: &'static [Part],
     files: Files,
     made: BTreeMap<String, Vec<u8>>,
 }
@@ -50,7 +51,28 @@ impl Reply {
     }
 }
 
+/// What a request says, as far as `T` asks for it.
+pub(crate) fn read<'r, T: Deserialize<'r>>(request: &'r Value) -> Result<T, Faults> {
+    T::deserialize(request).map_err(|error| not_understood(&error))
+}
+
+fn not_understood(error: &serde_json::Error) -> Faults {
+    Message::new("the page asks what is not understood")
+        .found(error.to_string())
+        .into()
+}
+
 impl Session {
+    /// A session without files that answers the requests of `parts`.
+    #[must_use]
+    pub fn new(parts: &'static [Part]) -> Self {
+        Session {
+            parts,
+            files: Files::default(),
+            made: BTreeMap::new(),
+        }
+    }
+
     /// Takes a file in, in the place of one of the same path.
     pub fn put(&mut self, path: &str, bytes: Vec<u8>) {
         self.files.insert(Path::new(path), bytes);
@@ -67,12 +89,10 @@ impl Session {
         self.made.get(name).map(Vec::as_slice)
     }
 
-    /// Answers `request`, a [`Request`] in JSON, in JSON. `tell` hears of long work.
+    /// Answers `request`, a JSON object whose `ask` is its name, in JSON. `tell` hears of long work.
     pub fn ask(&mut self, request: &[u8], tell: Tell) -> String {
-        let asked = serde_json::from_slice::<Request>(request);
-        let asked =
-            asked.map_err(|error| Message::new("the page asks what is not understood").found(error.to_string()));
-        let reply = asked.map_err(Faults::from).and_then(|asked| self.reply(asked, tell));
+        let asked = serde_json::from_slice::<Value>(request).map_err(|error| not_understood(&error));
+        let reply = asked.and_then(|asked| self.reply(&asked, tell));
         let (answer, made) = match reply {
             Ok(Reply { answer, made }) => (answer, made),
             // texts and numbers alone: this cannot fail
@@ -85,21 +105,12 @@ impl Session {
         answer.to_string()
     }
 
-    fn reply(&self, request: Request, tell: Tell) -> Result<Reply, Faults> {
-        match request {
-            Request::Choices => contract::choices(),
-            Request::Read(of) => contract::read(self, &of),
-            Request::New {
-                file,
-                contract,
-                actions,
-            } => contract::new(self, &file, &contract, actions),
-            Request::Compile { of, emit, target } => code::compile(self, &of, &emit, &target),
-            Request::Map(wanted) => map::map(self, &wanted),
-            Request::Loop(step) => loops::step(self, &step),
-            Request::Simulate { of, scenario } => loops::simulate(self, &of, &scenario, tell),
-            Request::Diagnose(wanted) => records::diagnose(self, &wanted, tell),
-        }
+    fn reply(&self, request: &Value, tell: Tell) -> Result<Reply, Faults> {
+        let name = request["ask"].as_str().unwrap_or_default();
+        let Some(answer) = self.parts.iter().find_map(|part| part.find(name)) else {
+            return Err(Message::new("the page asks what is not understood").found(name).into());
+        };
+        answer(self, request, tell)
     }
 
     /// A file of the session by its path, named by the user.

@@ -26,6 +26,7 @@ mod replayed_duties;
 mod replayed_filters;
 mod shell;
 mod simulate;
+mod studio;
 mod tables;
 mod traces;
 mod trained;

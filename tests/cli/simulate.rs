@@ -346,3 +346,16 @@ fn a_boost_is_simulated_beside_limit_and_classical_controllers_and_what_is_built
         &["built for the buck converter alone"],
     );
 }
+
+#[test]
+fn a_plant_beside_the_scenario_s_folder_is_shown_without_the_way_in_and_out() {
+    let desk = desk();
+    std::fs::create_dir(desk.path("scenarios")).unwrap();
+    desk.write("scenarios/s.toml", &SCENARIO.replace("plants/", "../plants/"));
+    desk.succeed("simulate scenarios/s.toml --policy policy --out out");
+    for file in ["summary.txt", "report.html"] {
+        let text = desk.read(&format!("out/{file}"));
+        assert!(text.contains("plants/paper-model.toml"), "{file}");
+        assert!(!text.contains("/../"), "{file}");
+    }
+}

@@ -1,7 +1,7 @@
 //! Files: read once, within their limits, with the way from a byte back to line and column.
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use crate::fault::{Fault, Message, Place};
 use crate::files::Files;
@@ -74,7 +74,7 @@ impl FileName {
         }
     }
 
-    /// The file that this one calls `text`: a path from its folder.
+    /// The file that this one calls `text`: a path from its folder. It is shown without the way into that folder and out again.
     #[must_use]
     pub fn beside(&self, text: &str) -> Self {
         let join = |file: &Path| {
@@ -83,10 +83,30 @@ impl FileName {
         };
         FileName {
             path: join(&self.path),
-            shown: join(&self.shown),
+            shown: self.shown_beside(text).unwrap_or_else(|| join(&self.shown)),
             origin: Origin::File,
             held: self.held.clone(),
         }
+    }
+
+    /// `plants/buck.toml` for `../plants/buck.toml` beside `train/train.toml`; nothing where that would lead elsewhere: behind a
+    /// symbolic link.
+    fn shown_beside(&self, text: &str) -> Option<PathBuf> {
+        let own = self.shown.parent()?;
+        let (mut folder, mut rest) = (own.to_path_buf(), Path::new(text));
+        while let Ok(inner) = rest.strip_prefix("..")
+            && matches!(folder.components().next_back(), Some(Component::Normal(_)))
+        {
+            folder.pop();
+            rest = inner;
+        }
+        let short = folder.join(rest);
+        let real = |path: &Path| {
+            path.parent()
+                .map(|folder| Path::new(".").join(folder).canonicalize().ok())
+        };
+        let is_same = self.held.is_some() || real(&short) == real(&own.join(text));
+        is_same.then_some(short)
     }
 
     /// The file called `name` in the folder of this one, named by nobody yet.

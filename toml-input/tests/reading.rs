@@ -222,6 +222,36 @@ fn what_a_missing_file_is_relative_to_follows_from_who_named_it() {
 }
 
 #[test]
+fn a_file_beside_another_is_shown_without_the_way_in_and_out() {
+    let shown = |file: &str, text: &str| FileName::new(Path::new(file)).beside(text).shown;
+    for (file, text, expected) in [
+        ("simulate/a.toml", "../plants/b.toml", "plants/b.toml"),
+        ("a/b/c.toml", "../../d.toml", "d.toml"),
+        ("a/b/c.toml", "../d.toml", "a/d.toml"),
+        // out of the working folder there is no shorter way
+        ("a.toml", "../d.toml", "../d.toml"),
+        ("../a/b.toml", "../../d.toml", "../../d.toml"),
+        ("a/b.toml", "c/../d.toml", "a/c/../d.toml"),
+        ("a/b.toml", "/d.toml", "/d.toml"),
+    ] {
+        assert_eq!(shown(file, text), Path::new(expected), "{text} beside {file}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_way_out_of_a_linked_folder_is_shown_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::create_dir_all(at("far/away")).unwrap();
+    std::fs::write(at("far/d.toml"), "x = 1").unwrap();
+    std::os::unix::fs::symlink(at("far/away"), at("near")).unwrap();
+    let named = FileName::new(&at("near/a.toml")).beside("../d.toml");
+    assert_eq!(named.shown, at("near/../d.toml"));
+    assert!(named.is_file(), "it is `far/d.toml`");
+}
+
+#[test]
 fn an_unknown_name_is_answered_with_all_and_the_nearest() {
     let fault = Fault::from(messages::unknown(
         "target",

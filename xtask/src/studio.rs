@@ -13,6 +13,10 @@ use crate::workspace::Workspace;
 /// What the step needs beyond Rust; its name among the tools.
 pub const TARGET: &str = "wasm32-unknown-unknown";
 
+/// The modules of the page, and the features of `studio-wasm` that each holds: the first is what a visitor loads, the others come when
+/// they are wanted.
+const MODULES: [(&str, &str); 3] = [("studio", "first"), ("code", "code"), ("records", "records")];
+
 /// Where the page is made: `policyc studio --from target/studio`.
 pub fn folder(workspace: &Workspace) -> PathBuf {
     workspace.target_dir.join("studio")
@@ -28,8 +32,8 @@ pub fn build(workspace: &Workspace, output: &Output, limit: Duration) -> Result<
             "not there: {TARGET}; the studio is NOT built, and its page is NOT tested"
         )));
     }
-    let arguments = ["build", "-p", "studio-wasm", "--profile", "studio", "--target", TARGET];
-    process::run_within(&mut workspace.cargo(&arguments), output, limit)?;
+    // before the page of an earlier build goes
+    let modules = modules(workspace, output, limit)?;
     let out = folder(workspace);
     if out.exists() {
         std::fs::remove_dir_all(&out).map_err(|error| told(&out, &error))?;
@@ -37,11 +41,11 @@ pub fn build(workspace: &Workspace, output: &Output, limit: Duration) -> Result<
     let page = workspace.root.join("studio/page");
     let mut copied = 0;
     let mut copy = |from: &Path, name: &str| -> Result<(), String> {
-        let to = out.join(name);
-        let parent = to.parent().unwrap_or(&out);
-        std::fs::create_dir_all(parent).map_err(|error| told(parent, &error))?;
         copied += 1;
-        std::fs::copy(from, &to).map(drop).map_err(|error| told(from, &error))
+        write(
+            &out.join(name),
+            &std::fs::read(from).map_err(|error| told(from, &error))?,
+        )
     };
     for entry in std::fs::read_dir(&page).map_err(|error| told(&page, &error))? {
         let path = entry.map_err(|error| told(&page, &error))?.path();
@@ -49,16 +53,37 @@ pub fn build(workspace: &Workspace, output: &Output, limit: Duration) -> Result<
     }
     // one style for what the command writes and what the page shows
     copy(&workspace.root.join("report/src/page.css"), "report.css")?;
-    let built = workspace.target_dir.join(TARGET).join("studio/studio_wasm.wasm");
-    copy(&built, "studio.wasm")?;
+    let mut lengths = Vec::new();
+    for (name, bytes) in &modules {
+        write(&out.join(name), bytes)?;
+        lengths.push(format!("{name} of {} kB", bytes.len() / 1000));
+    }
     for example in examples(&page)? {
         copy(
             &workspace.root.join("examples").join(&example),
             &format!("examples/{example}"),
         )?;
     }
-    let bytes = std::fs::metadata(&built).map_or(0, |data| data.len());
-    Ok(Ok(vec![format!("{copied} files, studio.wasm of {} kB", bytes / 1000)]))
+    Ok(Ok(vec![format!("{copied} files, and {}", lengths.join(", "))]))
+}
+
+/// The modules with their names.
+fn modules(workspace: &Workspace, output: &Output, limit: Duration) -> Result<Vec<(String, Vec<u8>)>, String> {
+    let built = workspace.target_dir.join(TARGET).join("studio/studio_wasm.wasm");
+    let build = |(name, feature): (&str, &str)| {
+        let arguments = ["build", "-p", "studio-wasm", "--profile", "studio", "--target", TARGET];
+        let parts = ["--no-default-features", "--features", feature];
+        process::run_within(&mut workspace.cargo(&[&arguments[..], &parts].concat()), output, limit)?;
+        let bytes = std::fs::read(&built).map_err(|error| told(&built, &error))?;
+        Ok((format!("{name}.wasm"), bytes))
+    };
+    MODULES.into_iter().map(build).collect()
+}
+
+fn write(to: &Path, bytes: &[u8]) -> Result<(), String> {
+    let parent = to.parent().unwrap_or(to);
+    std::fs::create_dir_all(parent).map_err(|error| told(parent, &error))?;
+    std::fs::write(to, bytes).map_err(|error| told(to, &error))
 }
 
 /// Every file that an example names, below `examples/`.

@@ -20,7 +20,7 @@ use crate::ownership::Replacing;
 pub use campaign::{Campaign, Engine, Merge, Script};
 use drm::Drm;
 pub use plants::{Design, Limit, New};
-pub use shared::{Columns, ControllerKind, Loudness, Outside};
+pub use shared::{Color, Columns, ControllerKind, Loudness, Outside};
 pub use shell::{Completions, Manpages, Studio};
 pub use verify::Verify;
 

@@ -23,6 +23,28 @@ pub struct Loudness {
     /// Also tell, on standard error, more of the progress, each file that is written, and the time it took
     #[arg(short, long, global = true, display_order = 903)]
     pub verbose: bool,
+    /// Colours of what is said
+    #[arg(
+        long,
+        global = true,
+        display_order = 904,
+        value_name = "WHEN",
+        default_value = "auto",
+        hide_default_value = true
+    )]
+    pub color: Color,
+}
+
+/// When colours are used.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum Color {
+    /// On a terminal, unless NO_COLOR is set
+    #[default]
+    Auto,
+    /// Into files and pipes, too
+    Always,
+    /// Nowhere
+    Never,
 }
 
 /// What runs the policy in a closed loop.

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use campaign::{Listed, Results, Schedule, State};
+use report::CommandLine;
 
 use super::folders::Files;
 use super::session::state;
@@ -18,8 +19,21 @@ pub struct Finished {
     pub files: Vec<String>,
 }
 
+/// What is said on the page of how it was made: a command, and what it reads. The same whatever cores and machines did the work.
+pub struct Origin {
+    /// Of `campaign` or `merge`.
+    pub command: CommandLine,
+    /// What it is, and its path as the user gave it.
+    pub read: Vec<(&'static str, String)>,
+}
+
 /// Writes the results. One process at a time; what others have done since `states` were read counts.
-pub fn finish(store: &Store, schedule: &Schedule, mut states: BTreeMap<String, State>) -> Result<Finished, Failure> {
+pub fn finish(
+    store: &Store,
+    schedule: &Schedule,
+    mut states: BTreeMap<String, State>,
+    origin: Origin,
+) -> Result<Finished, Failure> {
     let _lock = store::lock(store)?;
     for listed in &schedule.tasks {
         let id = &listed.id;
@@ -38,7 +52,10 @@ pub fn finish(store: &Store, schedule: &Schedule, mut states: BTreeMap<String, S
     let files = BTreeMap::from([
         ("results.json".to_owned(), results.json()),
         ("results.csv".to_owned(), results.csv()),
-        ("report.html".to_owned(), results.page()?),
+        (
+            "report.html".to_owned(),
+            report::made(&results.page()?, &origin.command, origin.read)?,
+        ),
     ]);
     store.check_best()?;
     output::replace_own_texts(&store.out, &files, store.replacing)?;

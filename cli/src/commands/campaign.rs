@@ -2,16 +2,14 @@
 
 use std::sync::Mutex;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
 
 use campaign::{Call, Plan, slurm, snakemake};
-use indicatif::HumanDuration;
 use report::grouped;
 use serde::Serialize;
 use serde_json::{Value, json};
 use toml_input::Message;
 
-use super::progress_line::ProgressLine;
+use super::progress_line::{Pace, ProgressLine};
 use crate::arguments::{Campaign, Engine, Script};
 use crate::campaign::{Finished, Local, Progress, Session, check};
 use crate::failure::Failure;
@@ -227,7 +225,7 @@ struct Follower {
     counts: Mutex<[usize; 2]>,
     all: usize,
     pending: usize,
-    begun: Instant,
+    pace: Pace,
 }
 
 impl Follower {
@@ -237,7 +235,7 @@ impl Follower {
             counts: Mutex::new([0, 0]),
             all,
             pending,
-            begun: Instant::now(),
+            pace: Pace::new(),
         }
     }
 
@@ -246,9 +244,7 @@ impl Follower {
         let failed = progress.reason.is_some();
         counts[usize::from(failed)] += 1;
         let ended = counts[0] + counts[1];
-        let left = self.pending.saturating_sub(ended);
-        let each = self.begun.elapsed().as_secs_f64() / ended.max(1) as f64;
-        let rest = HumanDuration(Duration::from_secs_f64((each * left as f64).clamp(0.0, 1e9)));
+        let left = self.pace.left(ended as u64, self.pending as u64);
         let done = self.all - self.pending + counts[0];
         let failures = if counts[1] == 0 {
             String::new()
@@ -258,7 +254,7 @@ impl Follower {
         if let Ok(mut line) = self.line.lock() {
             line.show(|| {
                 format!(
-                    "{done} of {} tasks done{failures}, {rest} left: {}",
+                    "{done} of {} tasks done{failures}{left}: {}",
                     self.all,
                     progress.task.title()
                 )

@@ -11,6 +11,7 @@ use random::{Random, SplitMix};
 use serde::Serialize;
 use toml_input::Message;
 
+use super::progress_line::Working;
 use crate::arguments::Certify;
 use crate::failure::Failure;
 use crate::made;
@@ -55,6 +56,7 @@ struct Answer<'a> {
 /// Proves, measures, draws, writes.
 pub fn run(options: &Certify) -> Result<Outcome, Failure> {
     let policy = super::load_as(&options.policy, options.outside, options.format)?;
+    let working = Working::new("bounding and drawing states");
     let mut made = make(
         &policy,
         &Request {
@@ -65,6 +67,7 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
             seed: options.seed,
         },
     )?;
+    drop(working);
     let read = [("policy", options.policy.display().to_string())];
     made::signed(&mut made.files, &[("--out", "certificate")], &read)?;
     output::replace_own_texts(&options.out, &made.files, options.replacing)?;

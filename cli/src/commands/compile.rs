@@ -15,6 +15,7 @@ use verify::fmu::Archive;
 use verify::{Files, advice};
 
 use super::compile_page;
+use super::progress_line::Working;
 use crate::arguments::Compile;
 use crate::failure::Failure;
 use crate::made;
@@ -67,6 +68,10 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     // a name that is no target's is said before a policy is read
     codegen::target(&options.target)?;
     let policy = super::load_as(&options.policy, options.outside, options.format)?;
+    let working = Working::new(match options.no_costs {
+        true => "generating",
+        false => "generating, and building to measure a step",
+    });
     let made = make(
         &policy,
         &Request {
@@ -78,6 +83,7 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
             golden_decisions: options.golden_decisions,
         },
     )?;
+    drop(working);
     ownership::check_policy(&options.out, &policy.name, options.replacing)?;
     let written = write(&options.out, &made.files, &made.archives, options.replacing)?;
     let costs = made.costs.texts(&policy, made.target, options.clock);

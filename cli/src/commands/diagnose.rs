@@ -17,7 +17,7 @@ use measured::ColumnMap;
 use plant::{Faults, Parameters};
 use toml_input::FileName;
 
-use super::progress_line::ProgressLine;
+use super::progress_line::{Pace, ProgressLine};
 use super::simulate;
 use crate::arguments::Diagnose;
 use crate::failure::Failure;
@@ -133,6 +133,7 @@ fn found(options: &Diagnose, columns: &ColumnMap, say: &(dyn Fn(Progress<'_>) + 
         .as_deref()
         .map(|policy| request(options, policy, &model))
         .transpose()?;
+    say(Progress::Stage("reading the records"));
     let (train, heldout) = records(options, columns, &model)?;
     let mut diagnosis = diagnose(&model, train, &heldout, say);
     diagnosis.keep_text(&FileName::from(&options.model));
@@ -147,7 +148,7 @@ fn found(options: &Diagnose, columns: &ColumnMap, say: &(dyn Fn(Progress<'_>) + 
 struct Shown {
     begun: Instant,
     stage: String,
-    stage_begun: Instant,
+    pace: Pace,
     line: ProgressLine,
 }
 
@@ -156,7 +157,7 @@ impl Shown {
         Shown {
             begun,
             stage: String::new(),
-            stage_begun: begun,
+            pace: Pace::new(),
             line: ProgressLine::new(),
         }
     }
@@ -166,28 +167,15 @@ impl Shown {
             Progress::Stage(stage) => {
                 self.line.clear();
                 talk::tell(&format!("{:6.1} s  {stage}", self.begun.elapsed().as_secs_f64()));
-                (self.stage, self.stage_begun) = (stage.to_owned(), Instant::now());
+                (self.stage, self.pace) = (stage.to_owned(), Pace::new());
             }
             Progress::Done { done, total } => {
-                let spent = self.stage_begun.elapsed().as_secs_f64();
-                let left = spent / done.max(1) as f64 * total.saturating_sub(done) as f64;
-                let (now, stage) = (self.begun.elapsed().as_secs_f64(), &self.stage);
+                let (now, stage, pace) = (self.begun.elapsed().as_secs_f64(), &self.stage, self.pace);
+                let left = || pace.left(done as u64, total as u64);
                 self.line
-                    .show(|| format!("{now:6.1} s  {stage}: {done} of {total}{}", remaining(left)));
+                    .show(|| format!("{now:6.1} s  {stage}: {done} of {total}{}", left()));
             }
         }
-    }
-}
-
-/// Least time left that is worth a word, s: the pieces of a stage differ by more, and one that takes longer than those before it would
-/// be "about 0 s left" for long.
-const WORTH_SAYING: f64 = 5.0;
-
-/// What is said of the time that is left.
-fn remaining(seconds: f64) -> String {
-    match seconds >= WORTH_SAYING {
-        true => format!(", about {seconds:.0} s left"),
-        false => String::new(),
     }
 }
 

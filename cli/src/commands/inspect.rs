@@ -9,6 +9,7 @@ use crate::arguments::Inspect;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::talk;
 
 /// Prints the checked policy.
 pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
@@ -19,8 +20,8 @@ pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
         output::say(inspection(&policy).trim_end())?;
     }
     if let Some(golden) = verify::golden_result(&policy).filter(|golden| !golden.passed()) {
-        eprintln!("\nDIFFERENT: the network does not give the trainer's golden answers");
-        eprintln!("  = hint: {}", golden.hint());
+        let problem = "the network does not give the trainer's golden answers";
+        talk::different(problem, Some(&golden.hint().to_string()));
         return Ok(Outcome::Different);
     }
     match verify::decisions(&policy, None).is_some_and(|decisions| !decisions.kept()) {
@@ -31,7 +32,10 @@ pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
                 Head::Schedule(_) => "the trainer's gains more",
                 Head::Choice(_) | Head::Residual(_) => "more of the trainer's decisions",
             };
-            eprintln!("\nDIFFERENT: the numeric format changes {decided} than the contract allows");
+            talk::different(
+                &format!("the numeric format changes {decided} than the contract allows"),
+                None,
+            );
             Ok(Outcome::Different)
         }
     }

@@ -5,6 +5,7 @@ use closed_loop::{LoadKind, LoadStep, band_text, holds_power, limits, reaches};
 use plant::Parameters;
 use toml_input::Message;
 
+use super::progress_line::Working;
 use crate::arguments::Limit;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
@@ -38,6 +39,7 @@ pub fn run(options: &Limit) -> Result<Outcome, Failure> {
     if steps.iter().any(|step| step.kind == LoadKind::Power) {
         holds_power(&plant, options.v_ref, &options.plant)?;
     }
+    let working = Working::new("searching the limit");
     let mut found = Vec::new();
     for step in steps {
         found.push((
@@ -45,6 +47,7 @@ pub fn run(options: &Limit) -> Result<Outcome, Failure> {
             Question::new(&plant, options.v_ref, step, options.duty)?.of_all_instants(),
         ));
     }
+    drop(working);
     output::say(&format!(
         "What no controller can beat on this plant: errors from {} V at the sampling instants, settled within {}, duties from\n\
          {low} to {high}. Each pair: load step at a sampling instant / at the worst instant, right behind one.\n\n{}",

@@ -9,6 +9,7 @@ use policy::seen_from;
 use toml_input::Fault;
 use train::start::{SCENARIO, Start, TRAINING, Wanted};
 
+use super::progress_line::Working;
 use crate::arguments::New;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
@@ -43,7 +44,9 @@ fn for_weights(options: &New, weights: &Path) -> Result<Outcome, Failure> {
         inside: options.inside.clone(),
         vecnormalize: options.vecnormalize.clone(),
     };
+    let working = Working::new("reading what the trainer saved");
     let new = import::new_policy(weights, out, &known)?;
+    drop(working);
     output::write_new_all(out, &new.contract, &new.beside)?;
     for line in &new.said {
         output::say(line)?;
@@ -60,7 +63,9 @@ fn for_weights(options: &New, weights: &Path) -> Result<Outcome, Failure> {
 
 fn for_plant(options: &New, file: &Path, wanted: Wanted) -> Result<Outcome, Failure> {
     let plant = Parameters::from_file(file)?;
+    let working = Working::new("designing, and searching the limit");
     let start = Start::new(&plant, file, wanted)?;
+    drop(working);
     let out = &contract(&options.out);
     let from_there = |path: &Path| -> Result<String, Failure> {
         seen_from(out, path).map_err(|message| Fault::in_file(path, message).into())

@@ -4,6 +4,7 @@ use serde::Serialize;
 use toml_input::Message;
 use verify::replay::{self, Log, Wanted};
 
+use super::progress_line::Working;
 use crate::arguments::Replay;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
@@ -21,6 +22,7 @@ struct Answer {
 /// Compares and reports.
 pub fn run(options: &Replay) -> Result<Outcome, Failure> {
     let policy = super::load_without_golden(&options.policy, options.outside)?;
+    let working = Working::new("replaying the log");
     let log = Log::open(&policy, &options.log, &options.map.join(","))?;
     if !log.compares() {
         let message = Message::new("the log has nothing to compare with").found(log.columns());
@@ -37,6 +39,7 @@ pub fn run(options: &Replay) -> Result<Outcome, Failure> {
             skip: options.skip,
         },
     )?;
+    drop(working);
     for note in &replay.notes {
         talk::note(&format!("{}: {note}", options.log.display()));
     }

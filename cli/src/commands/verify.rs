@@ -12,7 +12,7 @@ use verify::exchange::{Sheet, github};
 use verify::traces::Recorded;
 use verify::{Folder, Options, Progress, Report, folder, text};
 
-use super::progress_line::ProgressLine;
+use super::progress_line::{Pace, ProgressLine};
 use super::verify_codes;
 use crate::arguments::Verify;
 use crate::arguments::verify::{Asked, Service};
@@ -92,7 +92,15 @@ fn compare(options: &Verify) -> Result<Outcome, Failure> {
         return verify_codes::run(options, out, &policy, target, files);
     }
     let mut progress = ProgressLine::new();
-    let mut tell = |news| progress.show(|| told(news));
+    let mut pace = None;
+    let mut tell = |news| {
+        let left = match news {
+            // builds take their own time: the pace is that of the steps
+            Progress::Running { steps, of } => pace.get_or_insert_with(Pace::new).left(steps, of),
+            Progress::Compiling { .. } => String::new(),
+        };
+        progress.show(|| told(news) + &left);
+    };
     let report = verify::run(
         &policy,
         Options {

@@ -9,7 +9,7 @@ use toml_input::{Fault, Faults};
 use verify::codes::{Axis, Grid, Row};
 use verify::{Files, Options, shards, text};
 
-use super::progress_line::ProgressLine;
+use super::progress_line::{Pace, ProgressLine};
 use super::verify::told;
 use crate::arguments::Verify;
 use crate::failure::Failure;
@@ -45,8 +45,11 @@ pub fn run(
     let grid = Grid::of(policy).map_err(|message| Fault::in_file(&contract, message))?;
     let mut progress = ProgressLine::new();
     let parts = grid.parts();
+    let own: Vec<_> = (0..parts).filter(|part| options.every.shard.takes(*part)).collect();
+    let (pace, all, mut done) = (Pace::new(), own.len() as u64, 0);
     let compare = |part| -> Result<Row, Faults> {
-        let mut tell = |news| progress.show(|| format!("part {} of {parts}: {}", part + 1, told(news)));
+        let left = pace.left(done, all);
+        let mut tell = |news| progress.show(|| format!("part {} of {parts}: {}{left}", part + 1, told(news)));
         let report = verify::run(
             policy,
             Options {
@@ -61,14 +64,14 @@ pub fn run(
         if !report.compared() {
             return Err(text::nothing_compared(&report).into());
         }
+        done += 1;
         Ok(Row::new(part, &report))
     };
-    let own = (0..parts).filter(|part| options.every.shard.takes(*part));
     shards::run(
         out,
         options.every.shard,
         &grid.head(policy, target),
-        own,
+        own.into_iter(),
         compare,
         |_| {},
     )?;

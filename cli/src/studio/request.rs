@@ -83,6 +83,8 @@ mod tests {
         for (name, text) in [
             ("index.html", "page"),
             ("studio.wasm", "code"),
+            ("code.wasm", ""),
+            ("records.wasm", ""),
             ("examples/a/p.toml", "x = 1"),
         ] {
             let path = folder.path().join(name);

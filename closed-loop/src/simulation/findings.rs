@@ -90,7 +90,7 @@ impl Setting {
             let message = Message::new("no plant").hint("plant = \"../plants/paper-model.toml\", or --plant PLANT");
             return Err(Fault::in_file(file, message).into());
         };
-        let plant = name.path.clone();
+        let plant = name.shown.clone();
         let converter = Converter::load(name, &scenario.set)?;
         let references: Vec<f64> = (scenario.load_steps.iter().filter_map(|step| step.reference))
             .flatten()

@@ -110,6 +110,7 @@ pub(super) fn run(
         Some(second) => second.values.iter().copied().map(Some).collect(),
     };
     let mut cells = Vec::new();
+    let all = rows.len() * first.values.len();
     for row in rows {
         for column in &first.values {
             let numbers: Vec<f64> = [Some(*column), row].into_iter().flatten().collect();
@@ -124,7 +125,7 @@ pub(super) fn run(
                 .map(|(key, value)| format!("{key} = {value:.4e}"))
                 .collect::<Vec<_>>()
                 .join(", ");
-            tell(&text)?;
+            tell(&format!("converter {} of {all}: {text}", cells.len() + 1))?;
             cells.push(cell(setting, &parameters, numbers, controllers)?);
         }
     }

@@ -10,9 +10,18 @@
 
 use std::cell::RefCell;
 
-use studio::Session;
+use studio::{Part, Session};
 
-#[derive(Default)]
+/// What this module answers: a feature of the crate each.
+const PARTS: &[Part] = &[
+    #[cfg(feature = "first")]
+    studio::FIRST,
+    #[cfg(feature = "code")]
+    studio::CODE,
+    #[cfg(feature = "records")]
+    studio::RECORDS,
+];
+
 struct Page {
     session: Session,
     /// What the page wrote.
@@ -21,7 +30,11 @@ struct Page {
 }
 
 thread_local! {
-    static PAGE: RefCell<Page> = RefCell::default();
+    static PAGE: RefCell<Page> = RefCell::new(Page {
+        session: Session::new(PARTS),
+        room: Vec::new(),
+        answer: Vec::new(),
+    });
 }
 
 #[cfg(target_arch = "wasm32")]

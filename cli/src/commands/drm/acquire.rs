@@ -9,7 +9,7 @@ use plant::Parameters;
 use spice::SpiceConverter;
 
 use crate::arguments::drm::{Acquire, Simulator};
-use crate::commands::progress_line::ProgressLine;
+use crate::commands::progress_line::{Pace, ProgressLine};
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::output;
@@ -47,9 +47,13 @@ fn measure_open(options: &Acquire, parameters: &Parameters, plan: &mut Plan) -> 
     };
     let mut progress = ProgressLine::new();
     let mut measured = 0;
+    let (pace, open) = (Pace::new(), plan.open() as u64);
     for index in 0..plan.points.len() {
         let (point, None) = plan.points[index] else { continue };
-        progress.show(|| format!("point {} of {}: {}", index + 1, plan.points.len(), point.load));
+        progress.show(|| {
+            let left = pace.left(measured as u64, open);
+            format!("point {} of {}: {}{left}", index + 1, plan.points.len(), point.load)
+        });
         plan.points[index].1 = Some(measure(bench.as_mut(), parameters, &point, &protocol)?);
         measured += 1;
         if options.simulator == Simulator::Ngspice {

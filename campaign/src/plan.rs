@@ -1,7 +1,7 @@
 //! `plan.toml`: which commands are to be run on what.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use toml_input::{Document, Faults, FileName, Message, Place, Sink, Table, messages};
 
@@ -19,8 +19,6 @@ pub(crate) const MOST_TASKS: usize = 100_000;
 pub struct Plan {
     /// Title of the page of results.
     pub name: String,
-    /// Where it was read, as the user gave it.
-    pub file: PathBuf,
     /// Each once, in the order of the plan.
     pub tasks: Vec<Task>,
     /// Where the section of each task begins, in the order of `tasks`.
@@ -51,7 +49,6 @@ impl Plan {
         let mut faults = Sink::new();
         let mut plan = Self {
             name,
-            file: file.shown.clone(),
             tasks: Vec::new(),
             places: Vec::new(),
         };

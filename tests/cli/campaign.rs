@@ -51,6 +51,8 @@ fn a_campaign_has_what_its_commands_write_and_a_second_run_does_nothing() {
     let desk = desk();
     let first = desk.succeed("campaign plan.toml --out out");
     assert!(first.contains("4 of 4 tasks are done. 4 ran now."), "{first}");
+    let page = desk.read("out/report.html");
+    assert!(page.contains("How this page was made") && page.contains("policyc campaign PLAN.toml"));
     let before = results(&desk, "out");
     // the policy that `train` chooses among the same seeds, and the figures of `simulate`
     desk.succeed("train train/train.toml --out alone");

@@ -19,21 +19,8 @@ pub struct Finished {
     pub files: Vec<String>,
 }
 
-/// What is said on the page of how it was made: a command, and what it reads. The same whatever cores and machines did the work.
-pub struct Origin {
-    /// Of `campaign` or `merge`.
-    pub command: CommandLine,
-    /// What it is, and its path as the user gave it.
-    pub read: Vec<(&'static str, String)>,
-}
-
 /// Writes the results. One process at a time; what others have done since `states` were read counts.
-pub fn finish(
-    store: &Store,
-    schedule: &Schedule,
-    mut states: BTreeMap<String, State>,
-    origin: Origin,
-) -> Result<Finished, Failure> {
+pub fn finish(store: &Store, schedule: &Schedule, mut states: BTreeMap<String, State>) -> Result<Finished, Failure> {
     let _lock = store::lock(store)?;
     for listed in &schedule.tasks {
         let id = &listed.id;
@@ -52,10 +39,7 @@ pub fn finish(
     let files = BTreeMap::from([
         ("results.json".to_owned(), results.json()),
         ("results.csv".to_owned(), results.csv()),
-        (
-            "report.html".to_owned(),
-            report::made(&results.page()?, &origin.command, origin.read)?,
-        ),
+        ("report.html".to_owned(), signed(&results.page()?)?),
     ]);
     store.check_best()?;
     output::replace_own_texts(&store.out, &files, store.replacing)?;
@@ -80,6 +64,16 @@ pub fn finish(
         results,
         files: written,
     })
+}
+
+/// The page with what makes it. It names no plan and no folder, because the same results give the same page, whoever made them.
+fn signed(page: &str) -> Result<String, Failure> {
+    let command = CommandLine::new("policyc campaign PLAN.toml --out campaign");
+    let read = [
+        ("tasks", "plan.json, beside this page"),
+        ("from their results alone", "policyc merge campaign --out again"),
+    ];
+    Ok(report::made(page, &command, read)?)
 }
 
 /// The training file's path as the name of a folder: `train/paper12.toml` is `train-paper12`. Never empty.

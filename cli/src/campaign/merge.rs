@@ -8,10 +8,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use campaign::{Done, RECORD, Record, Schedule, State};
-use report::CommandLine;
 use toml_input::Message;
 
-use super::finish::{Finished, Origin, finish};
+use super::finish::{Finished, finish};
 use super::session::state;
 use super::store::{self, PLAN, Store};
 use crate::failure::Failure;
@@ -70,13 +69,7 @@ pub fn merge(from: &[PathBuf], out: &Path, replacing: Replacing) -> Result<Optio
         store.write_reason(&id, &reason)?;
         states.insert(id, State::Failed(reason));
     }
-    let shown = || from.iter().map(|folder| folder.display().to_string());
-    let command = shown().fold(CommandLine::new("policyc merge"), CommandLine::argument);
-    let origin = Origin {
-        command: command.option("--out", "campaign"),
-        read: vec![("campaigns", shown().collect::<Vec<_>>().join(", "))],
-    };
-    finish(&store, &schedule, states, origin).map(Some)
+    finish(&store, &schedule, states).map(Some)
 }
 
 /// The results that are to stand there.

@@ -6,10 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use campaign::{Done, Plan, State, Task};
-use report::CommandLine;
 use toml_input::Message;
 
-use super::finish::{Finished, Origin, finish};
+use super::finish::{Finished, finish};
 use super::folders;
 use super::stage::{is_gone_on_with, keep_for_resuming};
 use super::store::{Store, WORK};
@@ -199,14 +198,7 @@ impl Session {
     /// # Errors
     /// If they cannot be written.
     pub fn finish(&self) -> Result<Finished, Failure> {
-        let plan = self.plan.file.display().to_string();
-        let origin = Origin {
-            command: CommandLine::new("policyc campaign")
-                .argument(&plan)
-                .option("--out", "campaign"),
-            read: vec![("plan", plan)],
-        };
-        finish(&self.store, &self.plan.schedule(), self.states().clone(), origin)
+        finish(&self.store, &self.plan.schedule(), self.states().clone())
     }
 }
 

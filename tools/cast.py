@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""A moving picture of a command, from a real run in a terminal: docs/pictures/demo.gif.
+"""A moving picture of a command, from a real run in a terminal, such as docs/pictures/demo.gif.
 
     pip install pyte pillow
-    tools/cast.py docs/pictures/demo.gif 92x30 'policyc demo --steps 2000'
+    tools/cast.py docs/pictures/demo.gif 104x30 'policyc demo --steps 2000'
 
-The command runs in a pseudo-terminal of that size, and pyte plays the terminal. What it showed becomes the frames; pauses longer than two
-seconds are cut to two, and lines that come faster than they can be read are shown for a tenth of a second at least. The font is DejaVu Sans Mono.
+The command runs in a pseudo-terminal of that size, and pyte plays the terminal. Every line becomes a frame. Pauses longer than two seconds are
+cut to two, and lines that come faster than the eye can follow stay for a tenth of a second. The font is DejaVu Sans Mono.
 """
 
 import os
@@ -60,28 +60,23 @@ def record(command, columns, lines):
             break
         if not data:
             break
-        stream.feed(data)
-        shown = snapshot(screen)
-        if shown != frames[-1][1]:
-            frames.append((time.monotonic() - started, shown))
+        for line in data.splitlines(keepends=True):
+            stream.feed(line)
+            shown = snapshot(screen)
+            if shown != frames[-1][1]:
+                frames.append((time.monotonic() - started, shown))
     _, status = os.waitpid(pid, 0)
     if os.waitstatus_to_exitcode(status) != 0:
         sys.exit(f"`{command}` ended with {os.waitstatus_to_exitcode(status)}")
     return frames
 
 
-def thinned(frames):
-    """Pairs of a screen and how long it stays in s; screens that came too fast to be seen are left out."""
-    kept = [frames[0]]
-    for at, shown in frames[1:]:
-        if at - kept[-1][0] < SHORTEST_FRAME:
-            kept[-1] = (kept[-1][0], shown)
-        else:
-            kept.append((at, shown))
-    ends = [at for at, _ in kept[1:]]
-    stays = [min(end - at, LONGEST_PAUSE) for (at, _), end in zip(kept, ends)] + [LAST_FRAME]
+def held(frames):
+    """Pairs of a screen and how long it stays in s."""
+    ends = [at for at, _ in frames[1:]]
+    stays = [min(max(end - at, SHORTEST_FRAME), LONGEST_PAUSE) for (at, _), end in zip(frames, ends)] + [LAST_FRAME]
     stays[0] = max(stays[0], 1.0)
-    return [(shown, stay) for (_, shown), stay in zip(kept, stays)]
+    return [(shown, stay) for (_, shown), stay in zip(frames, stays)]
 
 
 def painted(shown, font):
@@ -105,7 +100,7 @@ def main():
     target, size, command = sys.argv[1:]
     columns, lines = map(int, size.split("x"))
     font = ImageFont.truetype(FONT, SIZE)
-    frames = thinned(record(command, columns, lines))
+    frames = held(record(command, columns, lines))
     images = [painted(shown, font) for shown, _ in frames]
     stays = [round(stay * 1000) for _, stay in frames]
     images[0].save(target, save_all=True, append_images=images[1:], duration=stays, loop=0, optimize=True)

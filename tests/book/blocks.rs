@@ -26,6 +26,12 @@ pub struct Block {
     pub needs: Option<String>,
 }
 
+/// The page, relative to the root, where the reader of this one comes from: its files and commands are there already.
+pub fn continues(page: &str) -> Option<&str> {
+    let (_, rest) = page.split_once("<!-- continues: ")?;
+    rest.split_once(" -->").map(|(path, _)| path)
+}
+
 /// The blocks of a page, first to last.
 ///
 /// # Errors

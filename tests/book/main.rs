@@ -41,7 +41,11 @@ fn run_all(pages: &[PathBuf]) -> Vec<(PathBuf, Outcome)> {
                         return;
                     };
                     let text = std::fs::read_to_string(tests::root().join(path)).unwrap();
-                    done.lock().unwrap().push((path.clone(), page::run(&text)));
+                    let first = blocks::continues(&text).map(|first| tests::root().join(first));
+                    let before = first.map(|first| std::fs::read_to_string(first).unwrap());
+                    done.lock()
+                        .unwrap()
+                        .push((path.clone(), page::run(&text, before.as_deref())));
                 }
             });
         }
@@ -83,7 +87,7 @@ fn a_page_that_lies_is_told_from_one_that_does_not() {
     let good = "```toml,file=a/b.toml\nx = 1\n```\n```sh\ncd a\ncat b.toml\n```\n```text,shown\nx = 1\n```\n\
                 ```sh,exit=3\nexit 3\n```\n```sh\nls b.toml ../../policyc/examples\npolicyc --version\n```\n\
                 ```sh\n# not tested: a reason\nfalse\n```\n```sh\n# needs: no-such-program\nfalse\n```\n";
-    let outcome = page::run(good);
+    let outcome = page::run(good, None);
     assert_eq!(outcome.faults, Vec::<String>::new());
     assert_eq!((outcome.commands, outcome.left_out.len()), (3, 2));
     for (bad, line) in [
@@ -94,7 +98,12 @@ fn a_page_that_lies_is_told_from_one_that_does_not() {
         ("```sh\necho one\n```\n```text,shown\ntwo\n```\n", "5: not printed"),
         ("```bash\nls\n```\n", "2: `bash`"),
     ] {
-        let faults = page::run(bad).faults;
+        let faults = page::run(bad, None).faults;
         assert!(faults.len() == 1 && faults[0].starts_with(line), "{bad}{faults:?}");
     }
+    let goes_on = "<!-- continues: one.md -->\n```sh\ncat made $WORD\n```\n```text,shown\nof the first\n```\n";
+    assert_eq!(blocks::continues(goes_on), Some("one.md"));
+    let first = "```sh\necho of the first >made\nWORD=made\n```\n";
+    assert_eq!(page::run(goes_on, Some(first)).faults, Vec::<String>::new());
+    assert_eq!(page::run(goes_on, None).faults.len(), 1);
 }

@@ -82,11 +82,16 @@ impl Desk {
     }
 }
 
-/// Runs a page.
-pub fn run(text: &str) -> Outcome {
+/// Runs a page behind the one where its reader comes from (`blocks::continues`), whose own lines are judged where they stand.
+pub fn run(text: &str, before: Option<&str>) -> Outcome {
     let started = Instant::now();
     let mut outcome = Outcome::default();
-    match blocks::read(text) {
+    let both = before.map_or(Ok(Vec::new()), blocks::read).and_then(|mut all| {
+        all.retain(|block| block.kind != Kind::Shown);
+        all.extend(blocks::read(text)?);
+        Ok(all)
+    });
+    match both {
         Ok(blocks) => run_blocks(&blocks, &mut outcome),
         Err(faults) => outcome.faults = faults,
     }

@@ -15,18 +15,24 @@ use tests::tools::{policyc, run};
 /// Ten times what it takes on two cores.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// The page that `cargo xtask studio` has made; none where WebAssembly cannot be built, or no browser shows it.
-fn page() -> Option<PathBuf> {
+/// The page that `cargo xtask studio` has made; none where WebAssembly cannot be built.
+fn built() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("studio");
-    let made = folder.join("studio.wasm").is_file();
+    let made = folder.join("records.wasm").is_file();
     if !made {
         eprintln!("no page of the studio (`cargo xtask studio`): NOT tested");
     }
+    made.then_some(folder)
+}
+
+/// [`built`], where a browser shows it.
+fn page() -> Option<PathBuf> {
+    let folder = built()?;
     let is_there = Browser::is_there();
     if !is_there {
         eprintln!("no chromium that starts: the page of the studio is NOT tested");
     }
-    (made && is_there).then_some(folder)
+    is_there.then_some(folder)
 }
 
 /// A server of a folder, which ends with the test.
@@ -178,6 +184,23 @@ fn the_page_makes_of_every_example_what_the_command_makes() {
     }
     the_same_diagnosis(&found["diagnosis"], &out("diagnosis"));
     the_same_faults(&found["faults"], temporary.path());
+}
+
+/// Most that a visitor may load before anything is shown, in bytes, compressed as most servers do: a second over 7 Mbit/s.
+const FIRST_LOAD: usize = 900_000;
+
+#[test]
+fn what_a_visitor_loads_first_is_within_its_aim() {
+    let Some(folder) = built() else { return };
+    let files = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+    let first = files.filter(|path| path.is_file() && !path.ends_with("code.wasm") && !path.ends_with("records.wasm"));
+    let compressed = |path: PathBuf| {
+        let packed = Command::new("gzip").arg("-9c").arg(&path).output().unwrap();
+        assert!(packed.status.success(), "{}", path.display());
+        packed.stdout.len()
+    };
+    let bytes: usize = first.map(compressed).sum();
+    assert!((100_000..FIRST_LOAD).contains(&bytes), "{bytes} bytes");
 }
 
 #[test]

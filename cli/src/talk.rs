@@ -56,6 +56,12 @@ pub fn note(note: &str) {
     tell(&look::of_answer(&format!("{NOTE}{note}")));
 }
 
+/// That a signal ended the run, and what became of it, on standard error: it is no answer. A quiet run says it, too.
+pub fn interrupted(what: &str) {
+    // nobody may be listening any more
+    let _ = writeln!(anstream::stderr(), "interrupted; {what}");
+}
+
 /// What is not as it should be, with what to do, on standard error: an answer in a quiet run, too.
 pub fn different(problem: &str, hint: Option<&str>) {
     let hint = hint.map(|hint| format!("\n  = {}: {hint}", look::of(Meaning::Hint, "hint")));

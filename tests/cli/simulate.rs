@@ -288,7 +288,7 @@ fn an_interrupted_simulation_ends_with_130_and_writes_nothing() {
     for more in [&[][..], &["--controller", "c"]] {
         let mut command = desk.command();
         command.args(["simulate", "s.toml", "--policy", "policy", "--out", "out"]);
-        let started = command.args(more).stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
+        let started = command.args(more).stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
         let mut child = started.unwrap();
         let begun = Instant::now();
         let status = format!("/proc/{}/status", child.id());
@@ -305,7 +305,7 @@ fn an_interrupted_simulation_ends_with_130_and_writes_nothing() {
         }
         let ended = super::interrupt(child);
         assert_eq!(ended.status.code(), Some(130));
-        assert!(String::from_utf8_lossy(&ended.stdout).contains("nothing written"));
+        assert!(String::from_utf8_lossy(&ended.stderr).contains("interrupted; nothing written"));
         assert!(!desk.path("out").exists());
     }
 }

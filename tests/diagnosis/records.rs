@@ -247,7 +247,7 @@ fn the_verdict_is_printed_before_the_notes() {
             .unwrap_or_else(|| panic!("{text}: {}", ran.stdout))
     };
     assert!(
-        place("verdict: ") < place("note: ") && place("note: ") < place("report: "),
+        place("verdict: ") < place("note: ") && place("note: ") < place("to look at: "),
         "{}",
         ran.stdout
     );

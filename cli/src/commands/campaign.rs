@@ -65,11 +65,7 @@ pub fn run(options: &Campaign) -> Result<Outcome, Failure> {
     result?;
     if stop.load(Ordering::Relaxed) {
         let left = session.pending().len();
-        let said = format!("Interrupted; {left} tasks are left. To go on, type the same again");
-        match options.json {
-            true => talk::tell(&said),
-            false => output::say(&said)?,
-        }
+        talk::interrupted(&format!("{left} tasks are left; to go on, type the same again"));
         return Ok(Outcome::Interrupted);
     }
     if let Some(task) = &options.task {

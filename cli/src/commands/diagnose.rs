@@ -53,7 +53,7 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     if lines.len() > 1 {
         lines.push(String::new());
     }
-    lines.push(format!("report: {}/report.html", options.out.display()));
+    lines.push(format!("to look at: {}/report.html", options.out.display()));
     output::say(&lines.join("\n"))?;
     Ok(match diagnosis.findings.compared.leaves_out() {
         true => Outcome::Different,

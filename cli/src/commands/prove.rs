@@ -13,6 +13,7 @@ use crate::interruption;
 use crate::made;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::talk;
 
 /// Proves, draws, writes.
 pub fn run(options: &Prove) -> Result<Outcome, Failure> {
@@ -40,7 +41,7 @@ pub fn run(options: &Prove) -> Result<Outcome, Failure> {
     let claims = prove::run(&tasks, &provers(options.exhaustive), &watch);
     line.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
     let (Ok(claims), false) = (claims, stop.load(Ordering::Relaxed)) else {
-        output::say("Interrupted; nothing written")?;
+        talk::interrupted("nothing written");
         return Ok(Outcome::Interrupted);
     };
     let answer = Answer::new(&tasks, claims);

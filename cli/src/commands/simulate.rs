@@ -39,10 +39,7 @@ pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
     let found = all(options, setting(options)?);
     if stop.load(Ordering::Relaxed) {
         // what failed, failed because of the signal
-        match options.json {
-            true => talk::tell("Interrupted; nothing written"),
-            false => output::say("Interrupted; nothing written")?,
-        }
+        talk::interrupted("nothing written");
         return Ok(Outcome::Interrupted);
     }
     let found = found?;

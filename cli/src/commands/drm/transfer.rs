@@ -15,6 +15,7 @@ use crate::interruption;
 use crate::made;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::talk;
 
 /// Transfers, writes, reports.
 pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
@@ -28,7 +29,7 @@ pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
         Simulator::Ngspice => at(options, setting, "ngspice", SpiceConverter::new),
     };
     if stop.load(Ordering::Relaxed) {
-        output::say("Interrupted; nothing written")?;
+        talk::interrupted("nothing written");
         return Ok(Outcome::Interrupted);
     }
     let found = found?;

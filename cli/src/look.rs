@@ -26,8 +26,7 @@ pub fn of(meaning: Meaning, word: &str) -> String {
     let code = match meaning {
         Meaning::Wrong => "1;91",
         Meaning::Note => "1;92",
-        Meaning::Hint => "1;96",
-        Meaning::Title => "1",
+        Meaning::Hint | Meaning::Title => "1",
     };
     format!("\x1b[{code}m{word}\x1b[0m")
 }

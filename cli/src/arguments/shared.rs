@@ -23,14 +23,15 @@ pub struct Loudness {
     /// Also tell, on standard error, more of the progress, each file that is written, and the time it took
     #[arg(short, long, global = true, display_order = 903)]
     pub verbose: bool,
-    /// Colours of what is said
+    /// Colours: auto (on a terminal, unless NO_COLOR is set), always, never
     #[arg(
         long,
         global = true,
         display_order = 904,
         value_name = "WHEN",
         default_value = "auto",
-        hide_default_value = true
+        hide_default_value = true,
+        hide_possible_values = true
     )]
     pub color: Color,
 }

@@ -1,8 +1,9 @@
 //! What unknown columns may be, by names that people give: a proposal for a map, never applied.
 
 use crate::locate::Located;
+use crate::metered::is_metered;
 use crate::quantity::{Quantity, is_unit, split_unit};
-use crate::sheet::Sheet;
+use crate::sheet::{Column, Sheet};
 
 /// What one word alone means, without case, umlauts and punctuation. One that could be two quantities (`current`, `voltage` beside
 /// another) stands where it is most often right: the user decides.
@@ -103,16 +104,24 @@ const MANNERS: [&str; 12] = [
 impl Sheet {
     /// Columns that nobody asked for and that are called like a quantity which was not found: its name and the column's.
     #[must_use]
-    pub fn guesses(&self, located: &Located, wanted: &[Quantity<'_>]) -> Vec<(&'static str, &str)> {
+    pub fn guesses<'a>(&'a self, located: &Located, wanted: &[Quantity<'_>]) -> Vec<(&'static str, &'a str)> {
         let missing = SYNONYMS
             .iter()
             .filter(|(name, _)| located.signal(name).is_none() && wanted.iter().any(|quantity| quantity.name == *name));
         let column = |(name, synonyms): &(&'static str, &[&str])| {
             let mut unused = located.unused.iter().filter_map(|index| self.columns().get(*index));
             let found = unused.find(|column| is_alike(&column.name, name, synonyms))?;
-            Some((*name, found.name.as_str()))
+            Some((*name, found))
         };
-        missing.filter_map(column).collect()
+        let found: Vec<_> = missing.filter_map(column).collect();
+        let has_i_out = located.signal("i_out").is_some() || found.iter().any(|(name, _)| *name == "i_out");
+        let asks_i_out = wanted.iter().any(|quantity| quantity.name == "i_out");
+        // a load current that was read off a meter, whatever it is called
+        let as_read = |(name, column): (&'static str, &'a Column)| match name {
+            "i_load" if asks_i_out && !has_i_out && is_metered(&column.values) => ("i_out", column.name.as_str()),
+            _ => (name, column.name.as_str()),
+        };
+        found.into_iter().map(as_read).collect()
     }
 }
 
@@ -288,6 +297,35 @@ mod tests {
                 "{header}: {guessed:?}"
             );
         }
+    }
+
+    #[test]
+    fn a_load_current_is_what_was_set_or_what_a_meter_showed_as_its_rows_say() {
+        // what was set: a step; what a meter showed: the same with a jitter of some milliamperes
+        let set = |n: u32| if n < 30 { 2.0 } else { 5.0 };
+        let jitter = |n: u32| f64::from(n.wrapping_mul(2_654_435_761) >> 16) / 65_536.0 - 0.5;
+        let proposed = |noise: f64, other: Option<&str>| {
+            let header = format!(
+                "t;duty;v_out;Iload{}",
+                other.map(|name| format!(";{name}")).unwrap_or_default()
+            );
+            let row = |n: u32| {
+                let load = set(n) + noise * jitter(n);
+                format!(
+                    "{};0.25;12.1;{load}{}\n",
+                    f64::from(n) * 1e-5,
+                    other.map_or("", |_| ";2.0")
+                )
+            };
+            let text = format!("{header}\n{}", (0..60).map(row).collect::<String>());
+            let sheet = Sheet::parse(Path::new("a.csv"), text.into_bytes(), &Options::default()).unwrap();
+            let located = sheet.locate(&VOCABULARY, &ColumnMap::default()).unwrap();
+            proposal(&sheet.guesses(&located, &VOCABULARY))
+        };
+        assert_eq!(proposed(0.0, None).as_deref(), Some("--map i_load=Iload"));
+        assert_eq!(proposed(0.02, None).as_deref(), Some("--map i_out=Iload"));
+        // another one is the measured load current
+        assert_eq!(proposed(0.02, Some("i_out")).as_deref(), Some("--map i_load=Iload"));
     }
 
     #[test]

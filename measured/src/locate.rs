@@ -206,6 +206,14 @@ impl Located {
         found.map(|(_, signal)| signal)
     }
 
+    /// Takes what was found as one quantity for another: a load current that is called as one that was set, and was measured.
+    pub fn take_as(&mut self, quantity: &str, other: &str) {
+        let found = self.signals.iter_mut().find(|(name, _)| name == quantity);
+        if let Some((name, _)) = found {
+            other.clone_into(name);
+        }
+    }
+
     /// A column that nobody asked for and that looks like time, and why it does.
     #[must_use]
     pub fn time_like(&self, sheet: &Sheet) -> Option<(usize, String)> {

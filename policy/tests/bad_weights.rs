@@ -287,6 +287,10 @@ fn odd_tensor_names_are_refused() {
         assert_tensor(&fault, FILE, name, &["not safe to print", "without `..`"]);
         assert!(!fault.to_string().trim_end().contains('\0'));
     }
+    // the leaves of a pytree of JAX: one answer, and what to do
+    let leaves = ["[0][0]", "[0][1]", "[1][0]"].map(|name| tensor(name, &[1]));
+    let fault = weights_fault(&[network(), leaves.to_vec()].concat());
+    assert_tensor(&fault, FILE, "[0][0]", &["and 2 more", "l0.weight"]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! A table with its signals found and turned into SI units: duty, load, channels, time.
 
-use measured::{ColumnMap, Located, Quantity, Sheet, Signal, proposal, table_faults};
+use measured::{ColumnMap, Located, Quantity, Sheet, Signal, is_metered, proposal, table_faults};
 use plant::Load;
 use toml_input::{Fault, Faults, Message, Sink};
 
@@ -34,7 +34,8 @@ pub(super) struct Raw<'a> {
 
 impl<'a> Raw<'a> {
     pub fn new(sheet: &'a Sheet, map: &ColumnMap) -> Result<Self, Faults> {
-        let located = sheet.locate(&Quantity::all(&NAMES), map)?;
+        let mut located = sheet.locate(&Quantity::all(&NAMES), map)?;
+        let metered = take_for_a_meter(sheet, &mut located);
         let may_be_capture = OF_CAPTURES.iter().any(|name| located.signal(name).is_some());
         incomplete(sheet, &located, may_be_capture).propagate()?;
         let mut faults = table_faults();
@@ -46,6 +47,7 @@ impl<'a> Raw<'a> {
         }
         faults.propagate()?;
         let mut repairs = located.notes(sheet, &[]);
+        repairs.extend(metered);
         let is_column = |name: &str| located.signal(name).is_some_and(|signal| signal.column().is_some());
         let is_set = |name: &str| {
             values
@@ -282,6 +284,22 @@ impl<'a> Raw<'a> {
 }
 
 /// What no record can do without; the first fault proposes a map of the columns that look like it.
+/// A load current that is called as a set one, alone, and whose rows are those of a meter: it is the measured one.
+fn take_for_a_meter(sheet: &Sheet, located: &mut Located) -> Option<String> {
+    let signal = located.signal("i_load")?;
+    signal.column()?;
+    let label = signal.label.clone();
+    let readings: Vec<f64> = (0..sheet.rows()).filter_map(|row| signal.number(sheet, row)).collect();
+    if located.signal("i_out").is_some() || !is_metered(&readings) {
+        return None;
+    }
+    located.take_as("i_load", "i_out");
+    Some(format!(
+        "{label} changes in nearly every row, back and forth, as the readings of a meter do: it is taken for i_out, the measured load \
+         current, and not for a load that was set"
+    ))
+}
+
 fn incomplete(sheet: &Sheet, located: &Located, may_be_capture: bool) -> Sink {
     let has = |name: &str| located.signal(name).is_some();
     let mut list = Vec::new();

@@ -171,6 +171,27 @@ fn a_set_load_current_is_said_to_be_set_unless_the_load_current_was_measured() {
 }
 
 #[test]
+fn a_load_current_with_the_jitter_of_a_meter_is_measured_whatever_its_column_is_called() {
+    let loads = |load: fn(usize) -> f64| {
+        let row = |n: usize| {
+            format!(
+                "{},0.5,{},{}\n",
+                n as f64 * 5e-5,
+                100.0 + (n % 7) as f64 * 1e-3,
+                load(n)
+            )
+        };
+        let rows: String = (0..80).map(row).collect();
+        read(format!("t,duty,v_out,i_load\n{rows}").as_bytes()).unwrap()
+    };
+    let note = |record: &Record| record.repairs.iter().any(|text| text.contains("it is taken for i_out"));
+    let set = loads(|n| if n < 40 { 2.0 } else { 4.0 });
+    let ramp = loads(|n| 2.0 + 0.01 * n as f64);
+    let metered = loads(|n| 2.0 + 0.008 * f64::from((n as u32).wrapping_mul(2_654_435_761) >> 16) / 65_536.0);
+    assert_eq!([&set, &ramp, &metered].map(note), [false, false, true]);
+}
+
+#[test]
 fn columns_with_names_of_their_own_get_a_whole_map_proposed_and_never_applied() {
     let other = header(HEADER, "time_s,D,Vout,IL,Spannung,Iout");
     let faults = read(other.as_bytes()).unwrap_err().to_string();

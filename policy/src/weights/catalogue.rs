@@ -51,11 +51,17 @@ pub(crate) fn no_tensors() -> Message {
         .expected("weights and biases of the network")
 }
 
-pub(crate) fn odd_name(name: &str) -> Message {
+/// `others`: how many more of the file's names are such.
+pub(crate) fn odd_name(name: &str, others: usize) -> Message {
     let short: String = name.chars().take(limits::MAX_TENSOR_NAME_CHARS).collect();
+    let more = match others {
+        0 => String::new(),
+        others => format!(" and {others} more"),
+    };
     Message::new("this tensor name is not safe to print or to use in a path")
-        .found(format!("\"{}\"", short.escape_debug()))
+        .found(format!("\"{}\"{more}", short.escape_debug()))
         .expected("1 to 128 of A-Z, a-z, 0-9, _ . / : - without `..`")
+        .hint("name each layer when you save: l0.weight and l0.bias, l1.weight, ...")
 }
 
 pub(crate) fn empty_tensor(shape: &[usize]) -> Message {

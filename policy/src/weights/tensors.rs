@@ -32,6 +32,7 @@ pub(crate) fn convert(file: &Binary, tensors: &SafeTensors<'_>, faults: &mut Sin
     let mut views = tensors.tensors();
     // the crate hands them out in the order of a hash map: faults and notes must not depend on it
     views.sort_by(|(a, _), (b, _)| a.cmp(b));
+    let views = plainly_named(file, views, faults);
     let (mut rounded, mut widened) = (Vec::new(), Vec::new());
     for (name, view) in &views {
         if let Err(message) = sound(name, view.shape()) {
@@ -91,6 +92,7 @@ pub struct NamedTensor {
 pub(crate) fn named(file: &Binary, tensors: &SafeTensors<'_>, faults: &mut Sink) -> Vec<NamedTensor> {
     let mut views = tensors.tensors();
     views.sort_by(|(a, _), (b, _)| a.cmp(b));
+    let views = plainly_named(file, views, faults);
     let one = |(name, view): &(String, TensorView<'_>)| {
         // counters of a batch norm and ends of an action space have no axis
         let shape = if view.shape().is_empty() { &[1] } else { view.shape() };
@@ -119,14 +121,30 @@ pub(crate) fn named(file: &Binary, tensors: &SafeTensors<'_>, faults: &mut Sink)
     list
 }
 
+/// The tensors whose name can be printed. The others are one fault: they are of one hand, and so is what to do.
+fn plainly_named<'d>(
+    file: &Binary,
+    views: Vec<(String, TensorView<'d>)>,
+    faults: &mut Sink,
+) -> Vec<(String, TensorView<'d>)> {
+    let (plain, odd): (Vec<_>, Vec<_>) = views.into_iter().partition(|(name, _)| is_plain(name));
+    if let Some((first, _)) = odd.first() {
+        faults.push(file.name.tensor_fault(first, catalogue::odd_name(first, odd.len() - 1)));
+    }
+    plain
+}
+
+/// Whether a name can stand in messages, comments and paths.
+fn is_plain(name: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '/' | ':' | '-');
+    let is_short = (1..=MAX_TENSOR_NAME_CHARS).contains(&name.len());
+    is_short && name.chars().all(allowed) && !name.contains("..") && !name.contains("//")
+}
+
 /// Whether a tensor's name can be printed and its shape holds anything.
 pub(crate) fn sound(name: &str, shape: &[usize]) -> Result<(), Message> {
-    let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '/' | ':' | '-');
-    if name.is_empty() || name.len() > MAX_TENSOR_NAME_CHARS || !name.chars().all(allowed) || name.contains("..") {
-        return Err(catalogue::odd_name(name));
-    }
-    if name.contains("//") {
-        return Err(catalogue::odd_name(name));
+    if !is_plain(name) {
+        return Err(catalogue::odd_name(name, 0));
     }
     if shape.is_empty() || shape.contains(&0) {
         return Err(catalogue::empty_tensor(shape));

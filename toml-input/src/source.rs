@@ -101,11 +101,9 @@ impl FileName {
             rest = inner;
         }
         let short = folder.join(rest);
-        let real = |path: &Path| {
-            path.parent()
-                .map(|folder| Path::new(".").join(folder).canonicalize().ok())
-        };
-        let is_same = self.held.is_some() || real(&short) == real(&own.join(text));
+        let real = |path: &Path| Path::new(".").join(path.parent()?).canonicalize().ok();
+        // what is not there is missing by either name
+        let is_same = self.held.is_some() || real(&own.join(text)).is_none_or(|folder| real(&short) == Some(folder));
         is_same.then_some(short)
     }
 

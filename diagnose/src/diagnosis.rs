@@ -54,6 +54,8 @@ pub struct Diagnosis {
     pub empirical: Option<Described>,
     /// The loop closed with a policy, if one was given.
     pub control: Option<crate::control::Control>,
+    /// A policy that was trained anew, and what it was worth.
+    pub retrained: Option<crate::retrain::judged::Judged>,
 }
 
 /// Diagnoses `model` by the records `train`; `heldout` only judges. `say` hears how far it is.
@@ -143,6 +145,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         model_text: None,
         empirical,
         control: None,
+        retrained: None,
     }
 }
 
@@ -303,6 +306,8 @@ fn gain_of(pair: Option<&Pair>, shifts: Vec<Shift>) -> Gain {
         shifts,
         closed_loop: None,
         closed_loop_missing: None,
+        retrained: None,
+        retrained_missing: None,
     }
 }
 

@@ -6,6 +6,7 @@ pub mod comparison;
 mod control;
 mod empirical;
 mod records;
+mod retrained;
 mod spectrum;
 
 use report::{Axis, BarChart, BarPanel, Chart, Page, Panel, ReportError, Section, Series, Table, quantity};
@@ -48,6 +49,12 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     }
     if let Some(control) = &diagnosis.control {
         page = page.section(control::section(control));
+    }
+    if let Some(reason) = &findings.gain.retrained_missing {
+        page = page.section(retrained::missing(reason));
+    }
+    if let Some(judged) = &diagnosis.retrained {
+        page = page.section(retrained::section(judged));
     }
     if let Some(section) = captures::section(diagnosis, records::second(diagnosis)) {
         page = page.section(section);
@@ -213,9 +220,13 @@ fn ties(diagnosis: &Diagnosis) -> Section {
         });
     }
     let heading = "Separation: standard deviations between the two explanations, initial states free. The best experiment of \
-                   each tie; all are in diagnosis.json.";
+                   each tie; all are in diagnosis.json, and the folder experiments has them period by period.";
     let mut table = Table::new(heading);
-    table = table.text("to separate").text("do").number("separation", 1);
+    table = table
+        .text("to separate")
+        .text("do")
+        .number("separation", 1)
+        .text("file");
     let mut shown = Vec::new();
     for next in &findings.next_experiments {
         // the best experiment of a tie comes first
@@ -227,6 +238,7 @@ fn ties(diagnosis: &Diagnosis) -> Section {
             next.separates.join(" from ").into(),
             next.experiment.clone().into(),
             next.separation.into(),
+            next.file.clone().into(),
         ]);
     }
     section.table(table)

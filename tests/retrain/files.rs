@@ -1,0 +1,101 @@
+//! What `--retrain` writes, and what it leaves alone.
+
+use super::{Bench, Noise, all, desk, nominal, policyc_in, records};
+
+/// The gain goes into the contract, as a file of its own, and the network learns on true volts.
+#[test]
+fn a_sensors_gain_stands_in_the_new_contract_and_the_users_is_untouched() {
+    let (desk, cases) = all();
+    let (_, ended) = &cases[3];
+    let contract = std::fs::read_to_string(ended.folder.join("out/retrain/policy/policy.toml")).unwrap();
+    assert!(
+        contract.contains("((v_out - v_out_offset) / v_out_gain) - v_ref"),
+        "{contract}"
+    );
+    let line = contract.lines().find(|line| line.starts_with("v_out_gain")).unwrap();
+    let gain: f64 = line.split(['=', '#']).nth(1).unwrap().trim().parse().unwrap();
+    assert!((gain - 1.02).abs() < 1e-3, "{line}");
+    let own = std::fs::read(tests::root().join("examples/train/blind/policy.toml")).unwrap();
+    assert_eq!(std::fs::read(desk.path().join("contract/policy.toml")).unwrap(), own);
+    let settings = std::fs::read_to_string(ended.folder.join("out/retrain/train.toml")).unwrap();
+    assert!(
+        settings.contains("plant = \"../plant.extended.toml\"")
+            && settings.contains("contract = \"contract/policy.toml\"")
+    );
+}
+
+#[test]
+fn the_loop_before_and_after_stands_in_page_and_json() {
+    let (_, cases) = all();
+    let (_, ended) = &cases[2];
+    let page = std::fs::read_to_string(ended.folder.join("out/report.html")).unwrap();
+    for part in ["Trained anew", "policy before", "trained anew", "pid", "duty changes"] {
+        assert!(page.contains(part), "{part}");
+    }
+    let retrained = &ended.json["gain"]["retrained"];
+    let controllers = retrained["places"][0]["controllers"].as_array().unwrap();
+    let names: Vec<&str> = controllers
+        .iter()
+        .map(|line| line["controller"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["policy before", "trained anew", "pid"]);
+    assert_eq!(controllers[0]["steps"].as_array().unwrap().len(), 4);
+}
+
+#[test]
+fn a_second_run_overwrites_nothing_and_says_so_at_once() {
+    let (_, cases) = all();
+    let (_, ended) = &cases[2];
+    let policy = ended.folder.join("out/retrain/policy/policy.toml");
+    let before = std::fs::read(&policy).unwrap();
+    let line = "diagnose --model ../plant.toml --train r0.csv r1.csv --policy ../old --retrain ../train.toml --out out";
+    let begun = std::time::Instant::now();
+    let again = policyc_in(&ended.folder, line);
+    assert_eq!(again.code, Some(2), "{}", again.stderr);
+    assert!(again.stderr.contains("holds a policy already"), "{}", again.stderr);
+    // before the diagnosis, which takes seconds
+    assert!(begun.elapsed().as_secs_f64() < 2.0);
+    assert_eq!(std::fs::read(&policy).unwrap(), before);
+}
+
+/// A training file that cannot be is told before the diagnosis, and nothing is written.
+#[test]
+fn a_bad_training_file_is_told_first() {
+    let desk = desk("0", 300);
+    let table = &records(&nominal(), &mut Noise(1))[0];
+    std::fs::write(desk.path().join("r.csv"), table.text()).unwrap();
+    let text = super::settings("0", 300).replace("v_ref = 100.0", "v_ref = \"high\"");
+    std::fs::write(desk.path().join("bad.toml"), text).unwrap();
+    let ran = policyc_in(
+        desk.path(),
+        "diagnose --model plant.toml --train r.csv --retrain bad.toml --out out",
+    );
+    assert_eq!(ran.code, Some(2));
+    assert!(
+        ran.stderr.contains("bad.toml") && ran.stderr.contains("v_ref"),
+        "{}",
+        ran.stderr
+    );
+    assert!(!desk.path().join("out").exists());
+}
+
+/// A tie between a sensor and the converter wants two different contracts: nothing is trained, and the experiment is a file.
+#[test]
+fn a_tie_of_sensor_and_converter_is_not_trained_on() {
+    let desk = desk("0", 300);
+    let hidden = Bench {
+        gain: [1.03, 1.0, 1.0, 1.0],
+        rows: 280,
+        ..nominal()
+    };
+    // the voltage alone does not tell its gain from the source's
+    let table = records(&hidden, &mut Noise(3))[0].clone().without(&["i_l", "i_out"]);
+    std::fs::write(desk.path().join("r.csv"), table.text()).unwrap();
+    let ran = policyc_in(
+        desk.path(),
+        "diagnose --model plant.toml --train r.csv --retrain train.toml --out out",
+    );
+    assert_eq!(ran.code, Some(1), "{}\n{}", ran.stdout, ran.stderr);
+    assert!(ran.stdout.contains("Not trained anew"), "{}", ran.stdout);
+    assert!(!desk.path().join("out/retrain").exists());
+}

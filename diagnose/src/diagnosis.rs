@@ -14,7 +14,7 @@ use crate::doubts;
 use crate::drive::Model;
 use crate::empirical::{self, Described};
 use crate::examine::{Examined, examined, held};
-use crate::findings::{Findings, Gain, Hidden, Named, Noise, Verdict};
+use crate::findings::{Findings, Gain, Named, Noise, Verdict};
 use crate::fit::State;
 use crate::gain::{Pair, Shift};
 use crate::instants;
@@ -25,6 +25,7 @@ use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
+use crate::unseen;
 use crate::whiteness;
 use crate::words::{nearest, other_carrier as other_carrier_said, sentence, shifted, si};
 use crate::worth::{self, Worth};
@@ -85,7 +86,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     }
     let explained = found.verdict != Verdict::Unexplained;
     let (state, trim) = better(&found, model.converter.f_sw);
-    let answer = answer(&found, pair.as_ref(), &state, sources, say);
+    let mut answer = answer(&found, pair.as_ref(), &state, sources, say);
     // the figures are those of the file that is written
     if !explained {
         pair = held(&found.problem, heldout, &base, &state, trim);
@@ -105,6 +106,9 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         let problem = whole_problem.as_ref().unwrap_or(&found.problem);
         empirical = described(problem, heldout, &base, (&mut state.model, trim), &mut pair);
     }
+    // beside the fit a trim is free and the held-out records are read by the causes: before is the model exactly as given
+    let given = as_given(&found.problem, &base);
+    worth::before(&mut answer.partial_gain, (&found.problem, &given), pair.as_ref());
     let compared = compared::of(&found.problem, &kept, heldout);
     let findings = Findings {
         sentence: sentence(&found, &answer.causes, set_aside.as_ref())
@@ -122,7 +126,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         set_aside,
         empirical: empirical.as_ref().map(|term| term.findings.clone()),
         structure: found.structure.iter().chain(&found.lines).cloned().collect(),
-        residuals: whiteness::of(&found.problem, found.attribution.state()),
+        residuals: whiteness::of_both((&found.problem, found.attribution.state()), pair.as_ref()),
         doubts: doubts::said(&found.doubts),
         not_detectable: answer.not_detectable,
         next_experiments: answer.next_experiments,
@@ -135,7 +139,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     };
     Diagnosis {
         findings,
-        given: as_given(&found.problem, &base),
+        given,
         extended: state.model,
         problem: found.problem,
         attribution: found.attribution,
@@ -260,7 +264,7 @@ fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<Str
             true => Vec::new(),
             false => partial_gain(problem, attribution, pair),
         },
-        not_detectable: hidden(problem, attribution),
+        not_detectable: unseen::hidden(problem, attribution),
         next_experiments: match explained {
             true => crate::next::experiments(problem, attribution, say),
             false => Vec::new(),
@@ -331,27 +335,6 @@ fn as_given(problem: &Problem, base: &Model) -> State {
     let mut held = problem.clone();
     held.trim_held = true;
     instants::scanned(&held, base, &held.first_starts())
-}
-
-fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
-    let sizes = attribution.smallest_sizes(problem);
-    let mut list: Vec<Hidden> = Vec::new();
-    for (cause, smallest) in sizes {
-        let candidate = &attribution.candidates[cause];
-        let knob = &candidate.form.knobs[0];
-        let reach = candidate.reach();
-        // what would be seen at a usual size is not worth a line
-        if smallest > candidate.large().min(reach) {
-            list.push(Hidden {
-                id: candidate.cause.id,
-                parameter: knob.name,
-                smallest: (smallest <= reach).then_some(smallest),
-                reach,
-                unit: knob.unit(),
-            });
-        }
-    }
-    list
 }
 
 fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], trim: f64) -> Noise {

@@ -66,6 +66,7 @@ mod small;
 mod spectrum;
 pub mod ties;
 pub mod timing;
+mod unseen;
 mod unsure_levels;
 pub mod whiteness;
 mod words;

@@ -35,7 +35,7 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     };
     page = page.verdict_as(mark, word(findings.verdict), headline(diagnosis, &list));
     if !list.is_empty() {
-        page = page.section(comparison::section(&list));
+        page = page.section(comparison::section(&list, &findings.residuals));
     }
     if let Some(section) = held_out(diagnosis) {
         page = page.section(section);
@@ -322,7 +322,9 @@ fn held_pictures(section: Section, diagnosis: &Diagnosis, pair: &Pair) -> Sectio
         let own = |shift: &&Shift| shift.record == pair.problem.records[record].name;
         let shifts = diagnosis.findings.gain.shifts.iter().filter(own);
         let place = |shift: &Shift| CHANNEL_NAMES.iter().position(|name| *name == shift.channel);
-        shifts.filter_map(place).collect::<Vec<_>>()
+        let mut list: Vec<usize> = shifts.filter_map(place).collect();
+        list.extend(records::unsettled(&pair.problem, [&pair.before, &pair.after], record));
+        list
     };
     let count = pair.problem.records.len();
     let worst = (0..count).max_by(|a, b| square(*a).total_cmp(&square(*b))).unwrap_or(0);

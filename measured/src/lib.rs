@@ -35,6 +35,7 @@ mod logged;
 mod map;
 mod mat;
 mod mdf;
+mod newer;
 mod quantity;
 mod sheet;
 mod signal;

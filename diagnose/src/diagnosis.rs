@@ -14,7 +14,7 @@ use crate::doubts;
 use crate::drive::Model;
 use crate::empirical::{self, Described};
 use crate::examine::{Examined, examined, held};
-use crate::findings::{Findings, Gain, Named, Noise, Verdict};
+use crate::findings::{Findings, Gain, Hidden, Named, Noise, Verdict};
 use crate::fit::State;
 use crate::gain::{Pair, Shift};
 use crate::instants;

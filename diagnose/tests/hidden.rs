@@ -204,10 +204,12 @@ fn a_shift_inside_a_record_is_unexplained() {
 fn a_part_is_compared_with_the_model_exactly_as_given() {
     let mut hidden = model();
     hidden.switch.turn_off_delay = 0.5e-6;
+    // no channel and no record without a shift: there is nothing to set aside
     let shifted = |seed| {
         let mut records = LARGE.records(&hidden, seed);
-        for value in &mut records[1].measured[0][150..] {
-            *value += 1.5;
+        for record in &mut records {
+            record.measured[0][150..].iter_mut().for_each(|v| *v += 1.5);
+            record.measured[1][90..].iter_mut().for_each(|i| *i -= 0.7);
         }
         records
     };
@@ -219,6 +221,9 @@ fn a_part_is_compared_with_the_model_exactly_as_given() {
         found.findings.sentence
     );
     assert!(!found.findings.partial_gain.is_empty());
+    // beside the fit a trim of the edges is free, which the model as given does not have: the figures could differ
+    let (fitted, given) = (found.attribution.null.chi2, found.given.chi2);
+    assert!(given > 1.001 * fitted, "{given} {fitted}");
     let fits = diagnose::page::comparison::compared(&found);
     for worth in &found.findings.partial_gain {
         let own = |fit: &&diagnose::page::comparison::Compared| {

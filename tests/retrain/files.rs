@@ -1,5 +1,11 @@
 //! What `--retrain` writes, and what it leaves alone.
 
+use closed_loop::Agent;
+use diagnose::retrain::Correction;
+use diagnose::retrain::contract::corrected;
+use plant::Signals;
+use tests::tools::copy_folder;
+
 use super::{Bench, Noise, all, desk, nominal, policyc_in, records};
 
 /// The gain goes into the contract, as a file of its own, and the network learns on true volts.
@@ -98,4 +104,89 @@ fn a_tie_of_sensor_and_converter_is_not_trained_on() {
     assert_eq!(ran.code, Some(1), "{}\n{}", ran.stdout, ran.stderr);
     assert!(ran.stdout.contains("Not trained anew"), "{}", ran.stdout);
     assert!(!desk.path().join("out/retrain").exists());
+}
+
+/// What a contract with a correction shows the network of a wrong sensor is what the user's shows of a right one.
+#[test]
+fn a_corrected_contract_sees_the_true_signal() {
+    let folder = tempfile::tempdir().unwrap();
+    copy_folder(&tests::root().join("examples/blind/policy"), folder.path());
+    let path = folder.path().join("policy.toml");
+    let own = std::fs::read_to_string(&path).unwrap();
+    let wrong = [("v_out", 1.03, -0.7, "V"), ("i_out", 0.9, 0.2, "A")];
+    let corrections = wrong.map(|(signal, gain, offset, unit)| Correction {
+        signal,
+        gain,
+        offset,
+        unit,
+    });
+    let right = Signals {
+        v_out: 97.5,
+        i_l: 4.0,
+        i_out: 5.5,
+        v_in: 200.0,
+    };
+    let shown = Signals {
+        v_out: 1.03 * right.v_out - 0.7,
+        i_out: 0.9 * right.i_out + 0.2,
+        ..right
+    };
+    let observed = |text: &str, measured: &Signals| {
+        std::fs::write(&path, text).unwrap();
+        let mut agent = Agent::<f32>::new(&policy::load(&path).unwrap()).unwrap();
+        agent.sense(measured).unwrap();
+        agent.observation().to_vec()
+    };
+    let before = observed(&own, &right);
+    let corrected = corrected(&own, &corrections);
+    assert!(corrected.left.is_empty() && corrected.before.is_empty() && corrected.taken.len() == 2);
+    let after = observed(&corrected.text, &shown);
+    let is_close = |(a, b): (&f32, &f32)| (a - b).abs() < 1e-4;
+    assert!(before.iter().zip(&after).all(is_close), "{before:?} {after:?}");
+    // without the correction it is another one
+    assert!(!before.iter().zip(&observed(&own, &shown)).all(is_close));
+}
+
+/// Codes are corrected where they become numbers; other forms of `[parameters]` keep theirs; and what cannot be corrected is said.
+#[test]
+fn converters_inline_parameters_and_observers_are_told_apart() {
+    let one = |text: &str| {
+        corrected(
+            text,
+            &[Correction {
+                signal: "v_out",
+                gain: 1.25,
+                offset: 0.5,
+                unit: "V",
+            }],
+        )
+    };
+    let adc = "[[signal]]\nname = \"v_out\"\nadc = { gain = 0.0625, offset = -1.0, bits = 12 }\n[[feature]]\nsource = \"v_out\"\n";
+    let made = one(adc);
+    assert_eq!(
+        made.text,
+        adc.replace("0.0625", "0.05").replace("offset = -1.0", "offset = -1.2")
+    );
+    assert_eq!(made.before, ["v_out"]);
+    let inline =
+        "parameters = { v_ref = 5.0 }\n[[signal]]\nname = \"v_out\"\n[[feature]]\nsource = \"v_ref - v_out\"  # e\n";
+    let made = one(inline);
+    assert!(
+        made.text
+            .starts_with("parameters = { v_out_gain = 1.25, v_out_offset = 0.5,  v_ref = 5.0 }"),
+        "{}",
+        made.text
+    );
+    assert!(
+        made.text
+            .contains("source = \"v_ref - ((v_out - v_out_offset) / v_out_gain)\"  # e"),
+        "{}",
+        made.text
+    );
+    let observer = "[[signal]]\nname = \"v_out\"\n[[observer]]\noutput_voltage = \"v_out\"\n";
+    let made = one(observer);
+    assert_eq!(made.text, observer);
+    assert!(made.left[0].contains("observer") && made.taken.is_empty());
+    // a contract that does not measure it has nothing to correct
+    assert_eq!(one("[[signal]]\nname = \"i_l\"\n").taken.len(), 0);
 }

@@ -160,42 +160,35 @@ fn at_bench(hidden: &Bench, policy: &Path) -> [f64; 2] {
 
 struct Case {
     name: &'static str,
-    /// Whether a policy has something to gain.
-    detectable: bool,
     hidden: Bench,
 }
 
-fn cases() -> [Case; 5] {
-    let case = |name, detectable, hidden| Case {
-        name,
-        detectable,
-        hidden,
+fn cases() -> [Case; 6] {
+    let case = |name, hidden| Case { name, hidden };
+    let gains = |v_out, i_l| Bench {
+        gain: [v_out, i_l, 1.0, 1.0],
+        ..nominal()
     };
     [
-        case("nothing", false, nominal()),
-        case("diode drop", true, Bench { v_f: 2.6, ..nominal() }),
-        case("winding", true, Bench { dcr: 0.5, ..nominal() }),
-        case(
-            "gain of v_out",
-            true,
-            Bench {
-                gain: [1.02, 1.0, 1.0, 1.0],
-                ..nominal()
-            },
-        ),
+        case("nothing", nominal()),
+        case("diode drop", Bench { v_f: 2.6, ..nominal() }),
+        case("winding", Bench { dcr: 0.5, ..nominal() }),
+        case("gain of v_out", gains(1.02, 1.0)),
         case(
             "capacitor",
-            false,
             Bench {
                 capacitance: 110e-6,
                 ..nominal()
             },
         ),
+        case("gain of i_l", gains(1.0, 0.92)),
     ]
 }
 
 /// What a case came to.
 struct Ended {
+    /// Whether the old policy is off by more at rest than on the bench that its model describes: then there is something to gain.
+    is_harmed: bool,
     code: Option<i32>,
     said: String,
     json: Value,
@@ -208,6 +201,18 @@ struct Ended {
 impl Ended {
     fn advice(&self) -> &str {
         self.json["gain"]["retrained"]["advice"].as_str().unwrap_or("none")
+    }
+
+    fn tell(&self, case: &Case) {
+        let (advice, harmed) = (self.advice(), self.is_harmed);
+        println!(
+            "{}: harmed {harmed}, advice {advice}, {:?} -> {:?}",
+            case.name, self.old, self.taken
+        );
+    }
+
+    fn is_better(&self) -> bool {
+        self.taken[1] < self.old[1] && self.taken[0] < self.old[0] + 0.5
     }
 }
 
@@ -224,12 +229,15 @@ fn ended(desk: &Path, case: &Case, seed: u64) -> Ended {
     let json: Value =
         serde_json::from_str(&std::fs::read_to_string(folder.join("out/diagnosis.json")).unwrap()).unwrap();
     let old = at_bench(&case.hidden, &desk.join("old"));
+    // three times what two trainings differ by
+    let is_harmed = old[1] > at_bench(&nominal(), &desk.join("old"))[1] + 0.15;
     let is_new = json["gain"]["retrained"]["advice"] == "new";
     let taken = match is_new {
         true => at_bench(&case.hidden, &folder.join("out/retrain/policy")),
         false => old,
     };
     Ended {
+        is_harmed,
         code: ran.code,
         said,
         json,
@@ -243,12 +251,12 @@ fn ended(desk: &Path, case: &Case, seed: u64) -> Ended {
 fn all() -> &'static (tempfile::TempDir, Vec<(Case, Ended)>) {
     static ALL: OnceLock<(tempfile::TempDir, Vec<(Case, Ended)>)> = OnceLock::new();
     ALL.get_or_init(|| {
-        let desk = desk("0", 5000);
+        let desk = desk("0, 1", 10_000);
         let trained = policyc_in(desk.path(), "train train.toml --out old");
         assert!(matches!(trained.code, Some(0 | 1)), "{}", trained.stderr);
         let ended = cases().map(|case| {
             let ended = ended(desk.path(), &case, 7);
-            println!("{}: {} {:?} -> {:?}", case.name, ended.advice(), ended.old, ended.taken);
+            ended.tell(&case);
             (case, ended)
         });
         (desk, ended.into())
@@ -262,16 +270,18 @@ fn no_worse([a, b]: [f64; 2], [was_a, was_b]: [f64; 2]) -> bool {
 }
 
 #[test]
-fn what_is_advised_is_better_at_the_hidden_converter_where_an_effect_shows_and_no_worse_elsewhere() {
+fn what_is_advised_is_better_at_the_hidden_converter_where_the_old_policy_suffers_and_no_worse_elsewhere() {
+    let mut harmed = 0;
     for (case, ended) in &all().1 {
         let words = format!("{}: {:?} -> {:?}\n{}", case.name, ended.old, ended.taken, ended.said);
         assert!(no_worse(ended.taken, ended.old), "{words}");
-        if case.detectable {
-            assert_eq!(ended.advice(), "new", "{words}");
-            let sum = |pair: [f64; 2]| pair[0] + pair[1];
-            assert!(sum(ended.taken) < sum(ended.old), "{words}");
+        if ended.is_harmed {
+            harmed += 1;
+            assert!(ended.is_better(), "{words}");
         }
     }
+    // volts that are shown too large are held too small, whatever a policy has learnt
+    assert!(harmed >= 1 && all().1[3].1.is_harmed, "{harmed}");
 }
 
 #[test]
@@ -286,86 +296,68 @@ fn where_the_model_holds_nothing_is_trained() {
 /// An effect with its size drawn: by tolerance or by fault, as large as benches have it.
 fn drawn(number: usize, random: &mut Noise) -> Case {
     let base = nominal();
-    let (name, detectable, hidden) = match number % 6 {
+    let sensors = |gain: [f64; 4], offset: f64| Bench {
+        gain,
+        offset: [offset, 0.0, 0.0, 0.0],
+        ..nominal()
+    };
+    let mut between = |low, high| random.between(low, high);
+    let (name, hidden) = match number % 7 {
         0 => (
             "diode",
-            true,
             Bench {
-                v_f: random.between(1.6, 3.0),
+                v_f: between(1.6, 3.0),
                 ..base
             },
         ),
         1 => (
             "copper",
-            true,
             Bench {
-                dcr: random.between(0.25, 0.6),
+                dcr: between(0.25, 0.6),
                 ..base
             },
         ),
-        2 => (
-            "volts",
-            true,
-            Bench {
-                gain: [random.between(1.01, 1.03), 1.0, 1.0, 1.0],
-                ..base
-            },
-        ),
-        3 => (
-            "amperes",
-            false,
-            Bench {
-                gain: [1.0, random.between(0.93, 1.07), 1.0, 1.0],
-                ..base
-            },
-        ),
-        4 => (
+        2 => ("volts", sensors([between(0.97, 1.03), 1.0, 1.0, 1.0], 0.0)),
+        3 => ("amperes", sensors([1.0, between(0.9, 1.1), 1.0, 1.0], 0.0)),
+        4 => ("zero", sensors([1.0; 4], between(0.5, 2.0))),
+        5 => (
             "capacitor",
-            false,
             Bench {
-                capacitance: random.between(100e-6, 200e-6),
+                capacitance: between(100e-6, 200e-6),
                 ..base
             },
         ),
         _ => (
             "inductor",
-            false,
             Bench {
-                inductance: random.between(1.5e-3, 2.6e-3),
+                inductance: between(1.5e-3, 2.6e-3),
                 ..base
             },
         ),
     };
-    Case {
-        name,
-        detectable,
-        hidden,
-    }
+    Case { name, hidden }
 }
 
 #[test]
-#[ignore = "a survey: twelve trainings of two seeds each, some ten minutes"]
+#[ignore = "a survey: fourteen trainings of two seeds each, some ten minutes"]
 fn of_drawn_effects_none_is_made_worse() {
     let desk = desk("0, 1", 12_000);
     let trained = policyc_in(desk.path(), "train train.toml --out old");
     assert!(matches!(trained.code, Some(0 | 1)), "{}", trained.stderr);
     let mut random = Noise(2026);
     let (mut worse, mut better, mut of) = (0, 0, 0);
-    for number in 0..12 {
+    for number in 0..14 {
         let mut case = drawn(number, &mut random);
-        let folder = format!("{}-{number}", case.name);
-        case.name = folder.leak();
+        case.name = format!("{}-{number}", case.name).leak();
         let ended = ended(desk.path(), &case, 100 + number as u64);
-        println!("{}: {} {:?} -> {:?}", case.name, ended.advice(), ended.old, ended.taken);
+        ended.tell(&case);
         worse += usize::from(!no_worse(ended.taken, ended.old));
-        if case.detectable {
-            of += 1;
-            better += usize::from(ended.taken.iter().sum::<f64>() < ended.old.iter().sum::<f64>());
-        }
+        of += usize::from(ended.is_harmed);
+        better += usize::from(ended.is_harmed && ended.is_better());
     }
-    println!("better {better} of {of}, worse {worse} of 12");
+    println!("better {better} of {of}, worse {worse} of 14");
     assert!(
         worse == 0 && better == of,
-        "better {better} of {of}, worse {worse} of 12"
+        "better {better} of {of}, worse {worse} of 14"
     );
 }

@@ -19,6 +19,9 @@ pub struct Corrected {
     pub text: String,
     /// The corrections that it has now.
     pub taken: Vec<Correction>,
+    /// Those of them that are corrected before they are numbers, in `adc`: a simulation, whose sensors show numbers, has to show the true
+    /// ones for the new contract.
+    pub before: Vec<&'static str>,
     /// What could not be corrected, and why: the network has to learn it.
     pub left: Vec<String>,
 }
@@ -33,7 +36,7 @@ pub fn corrected(text: &str, corrections: &[Correction]) -> Corrected {
     let (tree, _) = DeTable::parse_recoverable(text);
     let root = tree.get_ref();
     let (mut edits, mut parameters): (Vec<Edit>, Vec<String>) = (Vec::new(), Vec::new());
-    let (mut taken, mut left) = (Vec::new(), Vec::new());
+    let (mut taken, mut left, mut before) = (Vec::new(), Vec::new(), Vec::new());
     for correction in corrections {
         let name = correction.signal;
         // a contract that does not measure it has nothing to correct
@@ -42,7 +45,10 @@ pub fn corrected(text: &str, corrections: &[Correction]) -> Corrected {
         };
         if let Some(adc) = signal.get("adc") {
             match converter(text, adc, correction) {
-                Some(more) => edits.extend(more),
+                Some(more) => {
+                    edits.extend(more);
+                    before.push(name);
+                }
                 None => {
                     left.push(format!("{name}: its `adc` has no gain that is a number"));
                     continue;
@@ -82,6 +88,7 @@ pub fn corrected(text: &str, corrections: &[Correction]) -> Corrected {
     Corrected {
         text: out + &end,
         taken,
+        before,
         left,
     }
 }

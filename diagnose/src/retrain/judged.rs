@@ -126,6 +126,8 @@ pub struct Asked<'a> {
     pub task: &'a Task,
     /// Corrections that the contract of the new one has.
     pub corrections: Vec<Correction>,
+    /// Signals that the new contract corrects before they are numbers ([`super::contract::Corrected::before`]).
+    pub before: Vec<&'static str>,
     /// What to know besides.
     pub notes: Vec<String>,
     /// What findings over all load steps cost.
@@ -161,10 +163,20 @@ pub fn judged(plan: &Plan, asked: Asked<'_>) -> Result<Judged, Error> {
             controllers.push((*name, Box::new(Agent::<f32>::new(policy)?)));
         }
         controllers.extend(pid.map(|pid| (PID, Box::new(Classical::from(pid)) as Box<dyn Controller>)));
-        let converter = Converter::new(&plan.plant)?;
+        let converters = [
+            Converter::new(&plan.plant)?,
+            Converter::new(&as_seen_by_new(&plan.plant, &asked))?,
+        ];
         let instant = asked.task.all_instants()[0];
         for (name, mut controller) in controllers {
-            let run = follow(&converter, controller.as_mut(), asked.v_ref, asked.task, step, instant)?;
+            let run = follow(
+                &converters[usize::from(name == NEW)],
+                controller.as_mut(),
+                asked.v_ref,
+                asked.task,
+                step,
+                instant,
+            )?;
             shown.push((name, run.periods));
         }
     }
@@ -181,6 +193,13 @@ pub fn judged(plan: &Plan, asked: Asked<'_>) -> Result<Judged, Error> {
         shown_step: shown_step.map_or_else(String::new, |step| step.to_string()),
         shown,
     })
+}
+
+/// A plant whose sensors are right where the new contract corrects them before a simulation sees them.
+fn as_seen_by_new(plant: &Parameters, asked: &Asked<'_>) -> Parameters {
+    let numbers = super::true_sensors(&asked.before);
+    let numbers: Vec<(&str, f64)> = numbers.iter().map(|(key, value)| (key.as_str(), *value)).collect();
+    closed_loop::environment::varied(plant, &numbers)
 }
 
 /// It knows L, C and the source of the extended plant, and no losses; none where its topology has none.
@@ -202,6 +221,7 @@ fn place(
     asked: &Asked<'_>,
 ) -> Result<Place, Error> {
     let converter = Converter::new(plant)?;
+    let seen_by_new = Converter::new(&as_seen_by_new(plant, asked))?;
     let (task, v_ref) = (asked.task, asked.v_ref);
     let instants = task.all_instants();
     let mut controllers = Vec::new();
@@ -210,7 +230,8 @@ fn place(
         let mut agent = Agent::<f32>::new(policy)?;
         // the signals fit since `Agent::new`; a NaN would end the run as a divergence
         let control = move |sample: &Sample| agent.step(&sample.measured).unwrap_or(f64::NAN);
-        let findings = survey_all(&converter, &control, v_ref, task, &instants)?;
+        let converter = if *name == NEW { &seen_by_new } else { &converter };
+        let findings = survey_all(converter, &control, v_ref, task, &instants)?;
         controllers.push(line(*name, &findings, asked));
     }
     if let Some(pid) = pid {

@@ -161,6 +161,15 @@ fn sensors(diagnosis: &Diagnosis, fit: &Fit) -> BTreeSet<&'static str> {
     .collect()
 }
 
+/// The numbers of a plant whose sensors show these signals as they are, by key.
+#[must_use]
+pub fn true_sensors(signals: &[&'static str]) -> Vec<(String, f64)> {
+    let of = |signal: &&str| {
+        [("gain", 1.0), ("offset", 0.0)].map(|(what, value)| (format!("sensors.{signal}.{what}"), value))
+    };
+    signals.iter().flat_map(of).collect()
+}
+
 fn corrections(plant: &Parameters, signals: &BTreeSet<&'static str>) -> Vec<Correction> {
     let number = |signal: &str, what: &str| {
         let key = format!("sensors.{signal}.{what}");

@@ -15,12 +15,12 @@ pub struct Moved {
     pub notes: Vec<String>,
 }
 
-/// `text` with these files as `plant` and `contract`. Numbers that it sets at the plant would stand above what was found: they are
-/// made comments.
+/// `text` with these files as `plant` and `contract`, and with these numbers of the plant set. Numbers that it sets itself would stand above
+/// what was found: they are made comments.
 ///
 /// # Errors
 /// If the text is no training file whose entries stand for themselves.
-pub fn moved(text: &str, plant: &str, contract: &str) -> Result<Moved, Message> {
+pub fn moved(text: &str, plant: &str, contract: &str, set: &[(String, f64)]) -> Result<Moved, Message> {
     let mut out = text.to_owned();
     let mut edits: Vec<(Range<usize>, String)> = Vec::new();
     {
@@ -41,6 +41,11 @@ pub fn moved(text: &str, plant: &str, contract: &str) -> Result<Moved, Message> 
     if tree.get_ref().get("set").is_some() {
         let message = Message::new("the training file sets numbers of its plant where they cannot be taken out");
         return Err(message.hint("write them as lines under [set]"));
+    }
+    let mut out = out;
+    if !set.is_empty() {
+        out += "\n[set]  # the new contract corrects these in `adc`, before a simulation sees them\n";
+        out.extend(set.iter().map(|(key, value)| format!("\"{key}\" = {value:?}\n")));
     }
     let note = "[set] of the training file is left out: it changes the plant that the policy was trained on, and the diagnosis has \
                 found what this one is";
@@ -85,7 +90,7 @@ mod tests {
 
     #[test]
     fn plant_and_contract_move_and_all_else_stays() {
-        let moved = moved(TEXT, "../plant.extended.toml", "contract/policy.toml").unwrap();
+        let moved = moved(TEXT, "../plant.extended.toml", "contract/policy.toml", &[]).unwrap();
         let wanted = TEXT
             .replace("\"../plants/a.toml\"", "\"../plant.extended.toml\"")
             .replace("'p/policy.toml'", "\"contract/policy.toml\"")
@@ -99,11 +104,13 @@ mod tests {
     fn numbers_that_are_set_in_one_line_go_too() {
         let one = "plant = \"a\"\ncontract = \"b\"\nset = { \"switch.v_f\" = 0.8 }\n";
         assert!(
-            moved(one, "c", "d")
+            moved(one, "c", "d", &[])
                 .unwrap()
                 .text
                 .ends_with("# set = { \"switch.v_f\" = 0.8 }\n")
         );
-        assert!(moved("contract = \"b\"\n", "c", "d").is_err());
+        assert!(moved("contract = \"b\"\n", "c", "d", &[]).is_err());
+        let set = moved(one, "c", "d", &[("sensors.v_out.gain".to_owned(), 1.0)]).unwrap();
+        assert!(set.text.ends_with("\n\"sensors.v_out.gain\" = 1.0\n"), "{}", set.text);
     }
 }

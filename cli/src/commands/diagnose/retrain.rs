@@ -15,7 +15,7 @@ use ::diagnose::diagnosis::Diagnosis;
 use ::diagnose::retrain::contract::{Corrected, corrected};
 use ::diagnose::retrain::judged::{Asked, Judged, judged};
 use ::diagnose::retrain::settings::moved;
-use ::diagnose::retrain::{Plan, Refusal, plan};
+use ::diagnose::retrain::{Plan, Refusal, plan, true_sensors};
 use closed_loop::Converter;
 use closed_loop::scenario::Finding;
 use policy::Policy;
@@ -73,7 +73,7 @@ pub fn prepare(options: &Diagnose) -> Result<Option<Prepared>, Failure> {
     closed_loop::suits(&contract.policy, &model, v_ref, &options.model)?;
     closed_loop::holds_power(&model, v_ref, &options.model)?;
     // before the diagnosis: a training file that cannot be moved is told now
-    moved(&text, "plant", "contract").map_err(|message| Fault::in_file(file, message))?;
+    moved(&text, "plant", "contract", &[]).map_err(|message| Fault::in_file(file, message))?;
     let old = options
         .policy
         .as_deref()
@@ -142,6 +142,7 @@ pub fn run(options: &Diagnose, prepared: &Prepared, diagnosis: &Diagnosis) -> Re
             v_ref: settings.reward.v_ref,
             task: &settings.evaluation,
             corrections: corrected.taken,
+            before: corrected.before,
             notes,
             cost: &|findings: &[Finding]| scoring.score(findings).cost,
         },
@@ -157,7 +158,8 @@ fn files(prepared: &Prepared, plan: &Plan, diagnosis: &Diagnosis) -> Result<(Tex
     Converter::new(&plan.plant)?;
     let (text, beside) = prepared.contract.sources();
     let corrected = corrected(text, &plan.corrections);
-    let moved = moved(&prepared.text, "../plant.extended.toml", CONTRACT)?;
+    let set = true_sensors(&corrected.before);
+    let moved = moved(&prepared.text, "../plant.extended.toml", CONTRACT, &set)?;
     let mut notes = moved.notes;
     let mut files = Texts::new();
     for (name, bytes) in beside {

@@ -297,6 +297,28 @@ mod tests {
         assert!(begun.elapsed().as_secs_f64() < 20.0);
     }
 
+    /// Each byte of each file in three ways: about a hundred thousand files.
+    #[test]
+    #[ignore = "a minute; the fuzzer has the same files"]
+    fn no_changed_byte_makes_the_reader_of_version_7_3_panic_or_dawdle() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/fixtures/records");
+        let (mut longest, mut read) = (0.0_f64, 0);
+        for name in ["vectors_73.mat", "struct_73.mat", "controldesk_73.mat", "cells_73.mat"] {
+            let whole = std::fs::read(folder.join(name)).unwrap();
+            for place in 0..whole.len() {
+                for pattern in [0xff, 0x01, 0x80] {
+                    let mut turned = whole.clone();
+                    turned[place] ^= pattern;
+                    let begun = std::time::Instant::now();
+                    read += usize::from(Sheet::parse(Path::new("turned.mat"), turned, &Options::default()).is_ok());
+                    longest = longest.max(begun.elapsed().as_secs_f64());
+                }
+            }
+        }
+        println!("{read} read, the slowest in {longest:.3} s");
+        assert!(read > 0 && longest < 2.0, "{read} {longest}");
+    }
+
     /// A dataset of a terabyte of which no byte is stored, and one that claims four billion rows.
     #[test]
     fn a_file_that_claims_more_than_it_can_hold_is_refused_before_it_is_read() {

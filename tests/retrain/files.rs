@@ -190,3 +190,46 @@ fn converters_inline_parameters_and_observers_are_told_apart() {
     // a contract that does not measure it has nothing to correct
     assert_eq!(one("[[signal]]\nname = \"i_l\"\n").taken.len(), 0);
 }
+
+/// Ctrl-C keeps checkpoints; the same command with `--resume` ends with the very weights of a run that nobody disturbed.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_training_goes_on_bit_for_bit() {
+    let (desk, cases) = all();
+    let (_, whole) = &cases[2];
+    let folder = desk.path().join("interrupted");
+    std::fs::create_dir_all(&folder).unwrap();
+    for name in ["r0.csv", "r1.csv"] {
+        std::fs::copy(whole.folder.join(name), folder.join(name)).unwrap();
+    }
+    let line = "diagnose --model ../plant.toml --train r0.csv r1.csv --policy ../old --retrain ../train.toml --out out";
+    let mut child = std::process::Command::new(tests::tools::policyc())
+        .args(line.split(' '))
+        .current_dir(&folder)
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let checkpoints = folder.join("out/retrain/policy/checkpoints");
+    while !checkpoints.exists() {
+        assert!(child.try_wait().unwrap().is_none(), "ended before its first checkpoint");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let pid = child.id().to_string();
+    std::process::Command::new("kill")
+        .args(["-INT", &pid])
+        .status()
+        .unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    // the diagnosis is whole, and nothing says that a policy was trained
+    assert!(folder.join("out/diagnosis.json").exists() && !folder.join("out/retrain/policy/policy.toml").exists());
+    let again = policyc_in(&folder, line);
+    assert_eq!(again.code, Some(2), "{}", again.stderr);
+    assert!(again.stderr.contains("--resume"), "{}", again.stderr);
+    let resumed = policyc_in(&folder, &format!("{line} --resume"));
+    assert!(matches!(resumed.code, Some(0 | 1)), "{}", resumed.stderr);
+    for name in ["retrain/policy/weights.safetensors", "diagnosis.json"] {
+        let read = |folder: &std::path::Path| std::fs::read(folder.join("out").join(name)).unwrap();
+        assert!(read(&folder) == read(&whole.folder), "{name}");
+    }
+}

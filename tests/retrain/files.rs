@@ -22,7 +22,7 @@ fn a_sensors_gain_stands_in_the_new_contract_and_the_users_is_untouched() {
     let gain: f64 = line.split(['=', '#']).nth(1).unwrap().trim().parse().unwrap();
     assert!((gain - 1.02).abs() < 1e-3, "{line}");
     let own = std::fs::read(tests::root().join("examples/train/blind/policy.toml")).unwrap();
-    assert_eq!(std::fs::read(desk.path().join("contract/policy.toml")).unwrap(), own);
+    assert_eq!(std::fs::read(desk.join("contract/policy.toml")).unwrap(), own);
     let settings = std::fs::read_to_string(ended.folder.join("out/retrain/train.toml")).unwrap();
     assert!(
         settings.contains("plant = \"../plant.extended.toml\"")
@@ -197,7 +197,7 @@ fn converters_inline_parameters_and_observers_are_told_apart() {
 fn an_interrupted_training_goes_on_bit_for_bit() {
     let (desk, cases) = all();
     let (_, whole) = &cases[2];
-    let folder = desk.path().join("interrupted");
+    let folder = desk.join("interrupted");
     std::fs::create_dir_all(&folder).unwrap();
     for name in ["r0.csv", "r1.csv"] {
         std::fs::copy(whole.folder.join(name), folder.join(name)).unwrap();

@@ -93,12 +93,15 @@ fn nominal() -> Bench {
 /// A desk with model, contract and training file, and a policy that was trained on the model.
 fn desk(seeds: &str, steps: usize) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let examples = tests::root().join("examples");
-    let path = |name: &str| folder.path().join(name);
-    std::fs::copy(examples.join("blind/plant.toml"), path("plant.toml")).unwrap();
-    copy_folder(&examples.join("train/blind"), &path("contract"));
-    std::fs::write(path("train.toml"), settings(seeds, steps)).unwrap();
+    lay_out(folder.path(), seeds, steps);
     folder
+}
+
+fn lay_out(folder: &Path, seeds: &str, steps: usize) {
+    let examples = tests::root().join("examples");
+    std::fs::copy(examples.join("blind/plant.toml"), folder.join("plant.toml")).unwrap();
+    copy_folder(&examples.join("train/blind"), &folder.join("contract"));
+    std::fs::write(folder.join("train.toml"), settings(seeds, steps)).unwrap();
 }
 
 fn policyc_in(folder: &Path, line: &str) -> Ran {
@@ -248,14 +251,18 @@ fn ended(desk: &Path, case: &Case, seed: u64) -> Ended {
 }
 
 /// All cases with one short training each, and the desk that they lie on.
-fn all() -> &'static (tempfile::TempDir, Vec<(Case, Ended)>) {
-    static ALL: OnceLock<(tempfile::TempDir, Vec<(Case, Ended)>)> = OnceLock::new();
+fn all() -> &'static (PathBuf, Vec<(Case, Ended)>) {
+    static ALL: OnceLock<(PathBuf, Vec<(Case, Ended)>)> = OnceLock::new();
     ALL.get_or_init(|| {
-        let desk = desk("0, 1", 10_000);
-        let trained = policyc_in(desk.path(), "train train.toml --out old");
+        // nothing drops what a static holds: a folder of cargo's, which the next run clears
+        let desk = Path::new(env!("CARGO_TARGET_TMPDIR")).join("retrain");
+        let _ = std::fs::remove_dir_all(&desk);
+        std::fs::create_dir_all(&desk).unwrap();
+        lay_out(&desk, "0, 1", 10_000);
+        let trained = policyc_in(&desk, "train train.toml --out old");
         assert!(matches!(trained.code, Some(0 | 1)), "{}", trained.stderr);
         let ended = cases().map(|case| {
-            let ended = ended(desk.path(), &case, 7);
+            let ended = ended(&desk, &case, 7);
             ended.tell(&case);
             (case, ended)
         });

@@ -106,10 +106,9 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         let problem = whole_problem.as_ref().unwrap_or(&found.problem);
         empirical = described(problem, heldout, &base, (&mut state.model, trim), &mut pair);
     }
-    // beside the fit a trim is free and the held-out records are read by the causes: before is the model exactly as given
-    let given = as_given(&found.problem, &base);
-    worth::before(&mut answer.partial_gain, (&found.problem, &given), pair.as_ref());
+    let given = as_given(&found.problem, &base, &mut answer.partial_gain, pair.as_ref());
     let compared = compared::of(&found.problem, &kept, heldout);
+    let notes = answer.notes.into_iter().chain(unused).chain(standing.clone());
     let findings = Findings {
         sentence: sentence(&found, &answer.causes, set_aside.as_ref())
             + &answer.near
@@ -131,10 +130,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         not_detectable: answer.not_detectable,
         next_experiments: answer.next_experiments,
         captures: read_off(&found.problem, model),
-        noise: Noise {
-            repairs: answer.notes.into_iter().chain(unused).chain(standing.clone()).collect(),
-            ..noise_of(&found.problem, &found.attribution, &found.outliers, trim)
-        },
+        noise: noise_of(&found, trim, notes),
         gain: gain_of(pair.as_ref(), answer.shifts),
     };
     Diagnosis {
@@ -330,14 +326,18 @@ fn partial_gain(problem: &Problem, attribution: &Attribution, held: Option<&Pair
     list
 }
 
-/// The model without the trim of the edges that stands beside every fit.
-fn as_given(problem: &Problem, base: &Model) -> State {
+/// The model without the trim of the edges that stands beside every fit. What a part gains, too, begins there: beside the fit a trim is
+/// free, and the held-out records were read by the causes.
+fn as_given(problem: &Problem, base: &Model, partial_gain: &mut [Worth], pair: Option<&Pair>) -> State {
     let mut held = problem.clone();
     held.trim_held = true;
-    instants::scanned(&held, base, &held.first_starts())
+    let given = instants::scanned(&held, base, &held.first_starts());
+    worth::before(partial_gain, (problem, &given), pair);
+    given
 }
 
-fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], trim: f64) -> Noise {
+fn noise_of(found: &Examined, trim: f64, repairs: impl Iterator<Item = String>) -> Noise {
+    let problem = &found.problem;
     let measured = (0..CHANNELS).filter(|n| problem.sigma[*n].is_finite());
     let outlier = |one: &Outlier| {
         let record = &problem.records[one.record].name;
@@ -345,9 +345,9 @@ fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], 
     };
     Noise {
         sigma: measured.map(|n| (CHANNEL_NAMES[n], problem.sigma[n])).collect(),
-        inflation: attribution.inflation,
-        outliers: outliers.iter().map(outlier).collect(),
-        repairs: Vec::new(),
+        inflation: found.attribution.inflation,
+        outliers: found.outliers.iter().map(outlier).collect(),
+        repairs: repairs.collect(),
         trim,
     }
 }

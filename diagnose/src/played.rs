@@ -66,10 +66,10 @@ pub fn files(list: &[Experiment]) -> BTreeMap<String, String> {
 }
 
 fn readme(list: &[Experiment], period: f64) -> String {
-    let mut text = format!(
+    let mut text = String::from(
         "# Experiments that break the tie\n\n\
          Written by `policyc diagnose`. The records explain themselves in more than one way; each experiment here separates two of these.\n\n\
-         | file | what | separates | separation |\n|---|---|---|---|\n"
+         | file | what | separates | separation |\n|---|---|---|---|\n",
     );
     for next in list {
         let name = next.file.rsplit('/').next().unwrap_or(&next.file);

@@ -232,7 +232,7 @@ fn place(
         let control = move |sample: &Sample| agent.step(&sample.measured).unwrap_or(f64::NAN);
         let converter = if *name == NEW { &seen_by_new } else { &converter };
         let findings = survey_all(converter, &control, v_ref, task, &instants)?;
-        controllers.push(line(*name, &findings, asked));
+        controllers.push(line(name, &findings, asked));
     }
     if let Some(pid) = pid {
         let mut pid = pid.clone();

@@ -102,7 +102,37 @@ fn readme(list: &[Experiment], period: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::told;
+    use std::path::Path;
+
+    use measured::{ColumnMap, Sheet};
+    use plant::{Load, Parameters};
+
+    use super::{Played, told};
+    use crate::record::Record;
+
+    /// With the measured columns beside it the file is a record, as its page says.
+    #[test]
+    fn a_played_experiment_is_read_back_as_a_record() {
+        let load = |n: usize| Load {
+            conductance: 0.05,
+            current: [0.0, 2.5][n / 30],
+            power: 0.0,
+        };
+        let played = Played {
+            period: 1e-4,
+            duty: (0..60).map(|n| [0.45, 0.55][n / 20 % 2]).collect(),
+            load: (0..60).map(load).collect(),
+            v_in: 200.0,
+        };
+        let measured = |(n, line): (usize, &str)| match n {
+            0 => format!("{line},v_out\n"),
+            _ => format!("{line},{}\n", 100.0 + 0.1 * (n % 7) as f64),
+        };
+        let text: String = played.csv().lines().enumerate().map(measured).collect();
+        let sheet = Sheet::parse(Path::new("duty-steps.csv"), text.into(), &Record::file_options()).unwrap();
+        let record = Record::read(&sheet, &ColumnMap::default(), &Parameters::paper_table()).unwrap();
+        assert_eq!((&record.duty, &record.load), (&played.duty, &played.load));
+    }
 
     #[test]
     fn numbers_are_written_in_digits_without_binary_remains() {

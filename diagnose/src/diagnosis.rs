@@ -25,6 +25,7 @@ use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
+use crate::unseen;
 use crate::whiteness;
 use crate::words::{nearest, other_carrier as other_carrier_said, sentence, shifted, si};
 use crate::worth::{self, Worth};
@@ -54,6 +55,8 @@ pub struct Diagnosis {
     pub empirical: Option<Described>,
     /// The loop closed with a policy, if one was given.
     pub control: Option<crate::control::Control>,
+    /// A policy that was trained anew, and what it was worth.
+    pub retrained: Option<crate::retrain::judged::Judged>,
 }
 
 /// Diagnoses `model` by the records `train`; `heldout` only judges. `say` hears how far it is.
@@ -83,7 +86,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     }
     let explained = found.verdict != Verdict::Unexplained;
     let (state, trim) = better(&found, model.converter.f_sw);
-    let answer = answer(&found, pair.as_ref(), &state, sources, say);
+    let mut answer = answer(&found, pair.as_ref(), &state, sources, say);
     // the figures are those of the file that is written
     if !explained {
         pair = held(&found.problem, heldout, &base, &state, trim);
@@ -103,7 +106,9 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         let problem = whole_problem.as_ref().unwrap_or(&found.problem);
         empirical = described(problem, heldout, &base, (&mut state.model, trim), &mut pair);
     }
+    let given = as_given(&found.problem, &base, &mut answer.partial_gain, pair.as_ref());
     let compared = compared::of(&found.problem, &kept, heldout);
+    let notes = answer.notes.into_iter().chain(unused).chain(standing.clone());
     let findings = Findings {
         sentence: sentence(&found, &answer.causes, set_aside.as_ref())
             + &answer.near
@@ -120,20 +125,17 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         set_aside,
         empirical: empirical.as_ref().map(|term| term.findings.clone()),
         structure: found.structure.iter().chain(&found.lines).cloned().collect(),
-        residuals: whiteness::of(&found.problem, found.attribution.state()),
+        residuals: whiteness::of_both((&found.problem, found.attribution.state()), pair.as_ref()),
         doubts: doubts::said(&found.doubts),
         not_detectable: answer.not_detectable,
         next_experiments: answer.next_experiments,
         captures: read_off(&found.problem, model),
-        noise: Noise {
-            repairs: answer.notes.into_iter().chain(unused).chain(standing.clone()).collect(),
-            ..noise_of(&found.problem, &found.attribution, &found.outliers, trim)
-        },
+        noise: noise_of(&found, trim, notes),
         gain: gain_of(pair.as_ref(), answer.shifts),
     };
     Diagnosis {
         findings,
-        given: as_given(&found.problem, &base),
+        given,
         extended: state.model,
         problem: found.problem,
         attribution: found.attribution,
@@ -143,6 +145,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         model_text: None,
         empirical,
         control: None,
+        retrained: None,
     }
 }
 
@@ -257,7 +260,7 @@ fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<Str
             true => Vec::new(),
             false => partial_gain(problem, attribution, pair),
         },
-        not_detectable: hidden(problem, attribution),
+        not_detectable: unseen::hidden(problem, attribution),
         next_experiments: match explained {
             true => crate::next::experiments(problem, attribution, say),
             false => Vec::new(),
@@ -303,6 +306,8 @@ fn gain_of(pair: Option<&Pair>, shifts: Vec<Shift>) -> Gain {
         shifts,
         closed_loop: None,
         closed_loop_missing: None,
+        retrained: None,
+        retrained_missing: None,
     }
 }
 
@@ -321,35 +326,18 @@ fn partial_gain(problem: &Problem, attribution: &Attribution, held: Option<&Pair
     list
 }
 
-/// The model without the trim of the edges that stands beside every fit.
-fn as_given(problem: &Problem, base: &Model) -> State {
+/// The model without the trim of the edges that stands beside every fit. What a part gains, too, begins there: beside the fit a trim is
+/// free, and the held-out records were read by the causes.
+fn as_given(problem: &Problem, base: &Model, partial_gain: &mut [Worth], pair: Option<&Pair>) -> State {
     let mut held = problem.clone();
     held.trim_held = true;
-    instants::scanned(&held, base, &held.first_starts())
+    let given = instants::scanned(&held, base, &held.first_starts());
+    worth::before(partial_gain, (problem, &given), pair);
+    given
 }
 
-fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
-    let sizes = attribution.smallest_sizes(problem);
-    let mut list: Vec<Hidden> = Vec::new();
-    for (cause, smallest) in sizes {
-        let candidate = &attribution.candidates[cause];
-        let knob = &candidate.form.knobs[0];
-        let reach = candidate.reach();
-        // what would be seen at a usual size is not worth a line
-        if smallest > candidate.large().min(reach) {
-            list.push(Hidden {
-                id: candidate.cause.id,
-                parameter: knob.name,
-                smallest: (smallest <= reach).then_some(smallest),
-                reach,
-                unit: knob.unit(),
-            });
-        }
-    }
-    list
-}
-
-fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], trim: f64) -> Noise {
+fn noise_of(found: &Examined, trim: f64, repairs: impl Iterator<Item = String>) -> Noise {
+    let problem = &found.problem;
     let measured = (0..CHANNELS).filter(|n| problem.sigma[*n].is_finite());
     let outlier = |one: &Outlier| {
         let record = &problem.records[one.record].name;
@@ -357,9 +345,9 @@ fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], 
     };
     Noise {
         sigma: measured.map(|n| (CHANNEL_NAMES[n], problem.sigma[n])).collect(),
-        inflation: attribution.inflation,
-        outliers: outliers.iter().map(outlier).collect(),
-        repairs: Vec::new(),
+        inflation: found.attribution.inflation,
+        outliers: found.outliers.iter().map(outlier).collect(),
+        repairs: repairs.collect(),
         trim,
     }
 }

@@ -127,6 +127,12 @@ pub struct Gain {
     /// Why it is missing although one was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub closed_loop_missing: Option<String>,
+    /// A policy that was trained anew on the extended model, if that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub retrained: Option<crate::retrain::judged::Retrained>,
+    /// Why there is none although it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub retrained_missing: Option<String>,
 }
 
 /// What was set aside because nothing on the list explains it, while causes explain all the rest.

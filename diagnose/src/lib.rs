@@ -15,7 +15,7 @@
 //! The way: [`record`] (from a table that `measured` read) and [`drive`] make simulated rows of a model, [`problem`] a
 //! least-squares problem with initial states as unknowns, [`fit`] moves the parameters of [`causes`], [`attribute`]
 //! chooses among them, [`profile`], [`shape`], [`gain`] and [`next`] say how sure that is, [`control`] what it is worth under control, [`diagnosis`] holds the
-//! answer and [`extend`] and [`page`] write it down. A [`capture`] is a record whose residuals come from inside a period. See docs/reference/diagnosis.md.
+//! answer and [`extend`] and [`page`] write it down. [`retrain`] is what a policy makes of it. A [`capture`] is a record whose residuals come from inside a period. See docs/reference/diagnosis.md.
 
 mod aside;
 pub mod attribute;
@@ -48,6 +48,7 @@ pub mod noise;
 mod normal;
 pub mod page;
 mod parallel;
+pub mod played;
 pub mod preflight;
 pub mod problem;
 pub mod profile;
@@ -55,6 +56,7 @@ pub mod progress;
 mod quantised;
 pub mod record;
 pub mod results;
+pub mod retrain;
 pub mod rivals;
 mod sampling;
 mod search;
@@ -64,6 +66,7 @@ mod small;
 mod spectrum;
 pub mod ties;
 pub mod timing;
+mod unseen;
 mod unsure_levels;
 pub mod whiteness;
 mod words;

@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::attribute::Attribution;
 use crate::drive::Model;
 use crate::fit::State;
+use crate::played::{FOLDER, Played};
 use crate::problem::Problem;
 use crate::progress::{Listener, Progress};
 use crate::record::{CHANNELS, Record};
@@ -22,10 +23,15 @@ const LEAST: f64 = 3.0;
 pub struct Experiment {
     /// What to do.
     pub experiment: String,
+    /// Where it is written to, below the folder of the diagnosis.
+    pub file: String,
     /// The two explanations.
     pub separates: [String; 2],
     /// Predicted separation: standard deviations between the two, initial states free.
     pub separation: f64,
+    /// What the file says.
+    #[serde(skip)]
+    pub played: Played,
 }
 
 /// For every tie the experiments by predicted separation, best first; none where none of them would break it.
@@ -49,16 +55,28 @@ pub fn experiments(problem: &Problem, attribution: &Attribution, say: Listener<'
     };
     let mut list = Vec::new();
     for rival in ties {
-        let mut scored: Vec<Experiment> = crate::parallel::map(&plans, |(words, record)| Experiment {
-            experiment: words.clone(),
+        let mut scored: Vec<Experiment> = crate::parallel::map(&plans, |planned| Experiment {
+            experiment: planned.words.clone(),
+            file: format!("{FOLDER}/{}.csv", planned.name),
             separates: [name(&best.causes), name(&rival.causes)],
-            separation: separation(problem, record, &best.state.model, &rival.state.model),
+            separation: separation(problem, &planned.record, &best.state.model, &rival.state.model),
+            played: played(problem, &planned.record),
         });
         scored.retain(|experiment| experiment.separation >= LEAST);
         scored.sort_by(|a, b| b.separation.total_cmp(&a.separation));
         list.extend(scored.into_iter().take(2));
     }
     list
+}
+
+/// What a bench does for such a record.
+fn played(problem: &Problem, record: &Record) -> Played {
+    Played {
+        period: problem.bases.t_sw,
+        duty: record.duty.clone(),
+        load: record.load.clone(),
+        v_in: record.v_in_ratio * problem.base.plant.converter.v_in,
+    }
 }
 
 /// Measured with one model, fitted with the other.
@@ -109,6 +127,8 @@ fn prbs(n: usize) -> bool {
 
 /// An experiment that the bench can run.
 struct Plan {
+    /// Of its file.
+    name: &'static str,
     words: String,
     duty: Course,
     /// Conductance over the typical one, current, power.
@@ -117,7 +137,14 @@ struct Plan {
     v_in_ratio: f64,
 }
 
-fn plans(problem: &Problem) -> Vec<(String, Record)> {
+/// A plan as the record that it would give, without measured values.
+struct Planned {
+    name: &'static str,
+    words: String,
+    record: Record,
+}
+
+fn plans(problem: &Problem) -> Vec<Planned> {
     use Course::{Halves, Stair, Still, Trembling};
     let (v, i, v_in) = (problem.bases.v, problem.bases.i, problem.bases.v_in);
     // sizes of the plans are conventions: steps as large as a bench takes without leaving continuous conduction (but
@@ -128,36 +155,43 @@ fn plans(problem: &Problem) -> Vec<(String, Record)> {
     let none = Still(0.0);
     let rows = [
         (
+            "duty-steps",
             format!("duty steps {low:.2} to {high:.2} at {ohms:.1} ohm"),
             Stair(low, high),
             (1.0, none, none),
         ),
         (
+            "duty-prbs",
             format!("duty PRBS of 0.03 around {d:.2} at {ohms:.1} ohm"),
             Trembling(d),
             (1.0, none, none),
         ),
         (
+            "load-steps",
             format!("load current steps {:.1} to {:.1} A at duty {d:.2}", 0.3 * i, 2.0 * i),
             Still(d),
             (0.2, Stair(0.3 * i, 2.0 * i), none),
         ),
         (
+            "two-duties",
             format!("duty {low:.2} and {high:.2} at the same current of {i:.1} A"),
             Halves(low, high),
             (0.2, Still(i), none),
         ),
         (
+            "light-load",
             format!("light load: {:.0} ohm at duty {d:.2}, with duty steps", 10.0 * ohms),
             Stair(0.8 * d, 1.2 * d),
             (0.1, none, none),
         ),
         (
+            "zero-reading",
             "zero reading: duty 0 without load current".to_owned(),
             none,
             (1.0, none, none),
         ),
         (
+            "power-steps",
             format!(
                 "constant power steps {few:.0} to {many:.0} W beside {:.0} ohm",
                 2.0 * ohms
@@ -167,13 +201,15 @@ fn plans(problem: &Problem) -> Vec<(String, Record)> {
         ),
     ];
     let mut list: Vec<Plan> = Vec::new();
-    list.extend(rows.map(|(words, duty, load)| Plan {
+    list.extend(rows.map(|(name, words, duty, load)| Plan {
+        name,
         words,
         duty,
         load,
         v_in_ratio: 1.0,
     }));
     list.push(Plan {
+        name: "half-source",
         words: format!("duty PRBS at half the source voltage, {:.0} V", 0.5 * v_in),
         duty: Trembling(d),
         load: (1.0, none, none),
@@ -182,8 +218,7 @@ fn plans(problem: &Problem) -> Vec<(String, Record)> {
     list.into_iter().map(|plan| planned(problem, plan)).collect()
 }
 
-/// The record that a plan would give, without measured values.
-fn planned(problem: &Problem, plan: Plan) -> (String, Record) {
+fn planned(problem: &Problem, plan: Plan) -> Planned {
     let phase = problem.base.plant.pwm.sampling_phase;
     let (conductance, current, power) = plan.load;
     let load = |n: usize| Load {
@@ -217,5 +252,9 @@ fn planned(problem: &Problem, plan: Plan) -> (String, Record) {
         unread: Vec::new(),
         repairs: Vec::new(),
     };
-    (plan.words, record)
+    Planned {
+        name: plan.name,
+        words: plan.words,
+        record,
+    }
 }

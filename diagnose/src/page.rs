@@ -6,6 +6,7 @@ pub mod comparison;
 mod control;
 mod empirical;
 mod records;
+mod retrained;
 mod spectrum;
 
 use report::{Axis, BarChart, BarPanel, Chart, Page, Panel, ReportError, Section, Series, Table, quantity};
@@ -34,7 +35,7 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     };
     page = page.verdict_as(mark, word(findings.verdict), headline(diagnosis, &list));
     if !list.is_empty() {
-        page = page.section(comparison::section(&list));
+        page = page.section(comparison::section(&list, &findings.residuals));
     }
     if let Some(section) = held_out(diagnosis) {
         page = page.section(section);
@@ -48,6 +49,12 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     }
     if let Some(control) = &diagnosis.control {
         page = page.section(control::section(control));
+    }
+    if let Some(reason) = &findings.gain.retrained_missing {
+        page = page.section(retrained::missing(reason));
+    }
+    if let Some(judged) = &diagnosis.retrained {
+        page = page.section(retrained::section(judged));
     }
     if let Some(section) = captures::section(diagnosis, records::second(diagnosis)) {
         page = page.section(section);
@@ -213,9 +220,13 @@ fn ties(diagnosis: &Diagnosis) -> Section {
         });
     }
     let heading = "Separation: standard deviations between the two explanations, initial states free. The best experiment of \
-                   each tie; all are in diagnosis.json.";
+                   each tie; all are in diagnosis.json, and the folder experiments has them period by period.";
     let mut table = Table::new(heading);
-    table = table.text("to separate").text("do").number("separation", 1);
+    table = table
+        .text("to separate")
+        .text("do")
+        .number("separation", 1)
+        .text("file");
     let mut shown = Vec::new();
     for next in &findings.next_experiments {
         // the best experiment of a tie comes first
@@ -227,6 +238,7 @@ fn ties(diagnosis: &Diagnosis) -> Section {
             next.separates.join(" from ").into(),
             next.experiment.clone().into(),
             next.separation.into(),
+            next.file.clone().into(),
         ]);
     }
     section.table(table)
@@ -310,7 +322,9 @@ fn held_pictures(section: Section, diagnosis: &Diagnosis, pair: &Pair) -> Sectio
         let own = |shift: &&Shift| shift.record == pair.problem.records[record].name;
         let shifts = diagnosis.findings.gain.shifts.iter().filter(own);
         let place = |shift: &Shift| CHANNEL_NAMES.iter().position(|name| *name == shift.channel);
-        shifts.filter_map(place).collect::<Vec<_>>()
+        let mut list: Vec<usize> = shifts.filter_map(place).collect();
+        list.extend(records::unsettled(&pair.problem, [&pair.before, &pair.after], record));
+        list
     };
     let count = pair.problem.records.len();
     let worst = (0..count).max_by(|a, b| square(*a).total_cmp(&square(*b))).unwrap_or(0);

@@ -15,6 +15,7 @@ use crate::findings::Findings;
 use crate::gain::Regime;
 use crate::page::comparison::{Compared, compared};
 use crate::page::page;
+use crate::played;
 
 /// `diagnosis.json`.
 #[derive(Serialize)]
@@ -117,6 +118,7 @@ pub fn files(diagnosis: &Diagnosis) -> Result<BTreeMap<String, String>, Faults> 
     if let Some(control) = &diagnosis.control {
         files.insert("drm.toml".to_owned(), control.mapping.clone());
     }
+    files.extend(played::files(&diagnosis.findings.next_experiments));
     Ok(files)
 }
 

@@ -8,6 +8,7 @@
 use serde::Serialize;
 
 use crate::fit::State;
+use crate::gain::Pair;
 use crate::noise::channel;
 use crate::problem::Problem;
 use crate::record::{CHANNEL_NAMES, CHANNELS};
@@ -35,6 +36,8 @@ pub struct Driven {
     pub record: String,
     /// Channel.
     pub channel: &'static str,
+    /// Whether the record took no part in the fit.
+    pub heldout: bool,
     /// With the duty, if that moves.
     pub with_duty: Option<Largest>,
     /// With the set load, if that moves.
@@ -43,9 +46,16 @@ pub struct Driven {
     pub band: f64,
 }
 
-/// The figures of all channels of records over time.
+/// The figures of the training records at the best model, then those of held-out records at the extended one.
 #[must_use]
-pub fn of(problem: &Problem, state: &State) -> Vec<Driven> {
+pub fn of_both((problem, state): (&Problem, &State), held: Option<&Pair>) -> Vec<Driven> {
+    let mut list = of(problem, state, false);
+    list.extend(held.into_iter().flat_map(|pair| of(&pair.problem, &pair.after, true)));
+    list
+}
+
+/// The figures of all channels of records over time.
+fn of(problem: &Problem, state: &State, heldout: bool) -> Vec<Driven> {
     let mut list = Vec::new();
     for (index, record) in problem.records.iter().enumerate() {
         if record.settled || record.capture.is_some() {
@@ -54,7 +64,8 @@ pub fn of(problem: &Problem, state: &State) -> Vec<Driven> {
         for (n, name) in CHANNEL_NAMES.iter().enumerate().take(CHANNELS) {
             let left = channel(problem, &state.residual, index, n);
             let rows: Vec<usize> = (0..left.len()).filter(|row| left[*row] != 0.0).collect();
-            if rows.len() < FEWEST {
+            // a channel that no training record has is not compared: nobody knows its noise
+            if rows.len() < FEWEST || !problem.sigma[n].is_finite() {
                 continue;
             }
             let pick = |values: &[f64]| rows.iter().map(|row| values[*row]).collect::<Vec<f64>>();
@@ -65,6 +76,7 @@ pub fn of(problem: &Problem, state: &State) -> Vec<Driven> {
             list.push(Driven {
                 record: record.name.clone(),
                 channel: name,
+                heldout,
                 with_duty: largest(&shown, &pick(&record.duty)),
                 with_load: largest(&shown, &pick(&load)),
                 band: BAND / (rows.len() as f64).sqrt(),

@@ -83,6 +83,19 @@ pub fn of_held(pair: &Pair) -> Vec<Worth> {
     whole.map(worth).collect()
 }
 
+/// Sets what the model exactly as given leaves, of training records whose model as given ends at `given`, and of held-out records.
+pub fn before(list: &mut [Worth], (problem, given): (&Problem, &State), held: Option<&Pair>) {
+    let mut all = of_training(problem, given, given);
+    all.extend(held.map_or_else(Vec::new, of_held));
+    for worth in list {
+        let own =
+            |one: &&Worth| (one.heldout, one.channel, &one.record) == (worth.heldout, worth.channel, &worth.record);
+        if let Some(found) = all.iter().find(own) {
+            worth.rmse_before = found.rmse_before;
+        }
+    }
+}
+
 /// Another carrier, if the records are far better with it: this share of chi-square is left.
 const LEFT: f64 = 0.3;
 

@@ -7,6 +7,7 @@ use toml_input::{Faults, FileName, Message};
 use crate::csv;
 use crate::mat;
 use crate::mdf;
+use crate::newer;
 use crate::sheet::Sheet;
 
 /// How a file is read.
@@ -88,7 +89,7 @@ impl Sheet {
                 .into());
         }
         // one that was cut off within its first 128 bytes is a MAT file, too
-        if ::mat::is_mat(&bytes) || bytes.starts_with(b"MATLAB 5.0 MAT-file") {
+        if ::mat::is_mat(&bytes) || bytes.starts_with(b"MATLAB 5.0 MAT-file") || newer::is_newer(&bytes) {
             return mat::read(name, &bytes, options.most_bytes);
         }
         if ::mdf::is_mdf(&bytes) {

@@ -36,6 +36,7 @@ mod map;
 mod mat;
 mod mdf;
 mod metered;
+mod newer;
 mod quantity;
 mod sheet;
 mod signal;

@@ -1,4 +1,4 @@
-//! MAT files as records: vectors of one length, by their names.
+//! MAT files of all versions as records: vectors of one length, by their names.
 //!
 //! ```text
 //!   v_out = [n x 1], log.v_out = [n x 1]      a column `v_out`
@@ -15,6 +15,7 @@ use ::mat::{Error, Limits, Numbers, Value, Variable};
 use toml_input::{Faults, FileName, Message};
 
 use crate::logged::{Vector, called, columns, with_unit};
+use crate::newer;
 use crate::sheet::Sheet;
 
 const SAVE: &str = "in MATLAB: v_out = v_out(:); save('run.mat', 't', 'v_out', '-v7'), with a vector for each quantity; or writetable(T, 'run.csv')";
@@ -32,7 +33,10 @@ pub fn read(name: FileName, bytes: &[u8], most_bytes: u64) -> Result<Sheet, Faul
         most_growth: 2000,
         most_name: MOST_NAME,
     };
-    let variables = ::mat::read(bytes, limits).map_err(|error| name.fault(told(error)))?;
+    let variables = match newer::is_newer(bytes) {
+        true => newer::read(bytes, limits).map_err(|error| name.fault(told_of_newer(error)))?,
+        false => ::mat::read(bytes, limits).map_err(|error| name.fault(told(error)))?,
+    };
     let mut found = Found::default();
     for Variable { name, value } in &variables {
         found.visit(value, name);
@@ -67,9 +71,8 @@ pub fn read(name: FileName, bytes: &[u8], most_bytes: u64) -> Result<Sheet, Faul
 
 fn told(error: Error) -> Message {
     match error {
-        Error::Newer => Message::new("this is a MAT file of version 7.3, which is HDF5")
-            .expected("a MAT file of version 7 or 6")
-            .hint(SAVE),
+        // its first bytes would have sent it elsewhere
+        Error::Newer => Message::new("this is a MAT file of version 7.3").hint(SAVE),
         Error::BigEndian => Message::new("the numbers of this MAT file are stored big-endian")
             .expected("little-endian")
             .hint(SAVE),
@@ -83,6 +86,23 @@ fn told(error: Error) -> Message {
             .found("elements that do not hold together")
             .expected("a MAT file of version 7 or 6")
             .hint("copy or save the file again"),
+    }
+}
+
+fn told_of_newer(error: newer::Error) -> Message {
+    match error {
+        newer::Error::Broken(said) => Message::new("this is not a sound MAT file of version 7.3")
+            .found(said)
+            .expected("HDF5 as MATLAB's save -v7.3 writes it")
+            .hint("copy or save the file again, or save it with -v7"),
+        newer::Error::Larger { name, most } => {
+            Message::new(format!("`{name}` of the MAT file is larger than a record"))
+                .expected(format!(
+                    "at most {most} bytes in all variables, unpacked, for a file of this length"
+                ))
+                .hint("save less of the record")
+        }
+        newer::Error::Nested { name } => Message::new(format!("`{name}` has more parts than a record has")).hint(SAVE),
     }
 }
 
@@ -225,6 +245,94 @@ mod tests {
                 assert!(found.iter().zip(&expected).all(is_close), "{name}: {quantity}");
             }
         }
+    }
+
+    /// The same tables by another library, with MATLAB's header, classes and transposed arrays (fixtures/records/mat73.py).
+    #[test]
+    fn files_of_version_7_3_hold_the_record_of_the_text() {
+        let text = fixture("record.csv");
+        let inductor = "i_l=scope_1,r_load=scope_2";
+        for (name, map, quantities) in [
+            ("vectors_73.mat", "", &["t", "duty", "v_out", "i_l", "r_load"][..]),
+            ("struct_73.mat", inductor, &["t", "duty", "v_out", "i_l", "r_load"]),
+            ("controldesk_73.mat", "", &["t", "duty", "v_out", "i_l"]),
+            ("cells_73.mat", "v_out=runs_1,duty=runs_2", &["t", "duty", "v_out"]),
+        ] {
+            let sheet = fixture(name);
+            assert_eq!(sheet.rows(), text.rows(), "{name}");
+            for quantity in quantities {
+                let (found, expected) = (numbers(&sheet, quantity, map), numbers(&text, quantity, ""));
+                let (found, expected) = (found.unwrap_or_else(|| panic!("{name}: {quantity}")), expected.unwrap());
+                // single precision in one of them, millivolts in another
+                let is_close = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * b.abs();
+                assert!(found.iter().zip(&expected).all(is_close), "{name}: {quantity}");
+            }
+        }
+        // text, single numbers, squares, complex and empty matrices are no channels, in a file of either version
+        let mut headers: Vec<String> = fixture("vectors_73.mat").headers().map(str::to_owned).collect();
+        headers.sort();
+        assert_eq!(headers, ["duty", "i_l", "r_load", "t", "v_out"]);
+    }
+
+    /// Whatever is cut off or turned over, the answer is a fault of the file or a table, at once.
+    #[test]
+    fn a_damaged_file_of_version_7_3_is_refused_at_once() {
+        let whole =
+            std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/fixtures/records/controldesk_73.mat"));
+        let whole = whole.unwrap();
+        let begun = std::time::Instant::now();
+        for length in [127, 128, 511, 512, 530, 700, 2000, whole.len() / 2, whole.len() - 9] {
+            let cut = Sheet::parse(Path::new("cut.mat"), whole[..length].to_vec(), &Options::default());
+            let said = cut.unwrap_err().to_string();
+            assert!(
+                said.contains("cut.mat") && said.contains("MAT file"),
+                "{length}: {said}"
+            );
+        }
+        for place in (512..whole.len()).step_by(37) {
+            let mut turned = whole.clone();
+            turned[place] ^= 0xff;
+            let _ = Sheet::parse(Path::new("turned.mat"), turned, &Options::default());
+        }
+        assert!(begun.elapsed().as_secs_f64() < 20.0);
+    }
+
+    /// Each byte of each file in three ways: about a hundred thousand files.
+    #[test]
+    #[ignore = "a minute; the fuzzer has the same files"]
+    fn no_changed_byte_makes_the_reader_of_version_7_3_panic_or_dawdle() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/fixtures/records");
+        let (mut longest, mut read) = (0.0_f64, 0);
+        for name in ["vectors_73.mat", "struct_73.mat", "controldesk_73.mat", "cells_73.mat"] {
+            let whole = std::fs::read(folder.join(name)).unwrap();
+            for place in 0..whole.len() {
+                for pattern in [0xff, 0x01, 0x80] {
+                    let mut turned = whole.clone();
+                    turned[place] ^= pattern;
+                    let begun = std::time::Instant::now();
+                    read += usize::from(Sheet::parse(Path::new("turned.mat"), turned, &Options::default()).is_ok());
+                    longest = longest.max(begun.elapsed().as_secs_f64());
+                }
+            }
+        }
+        println!("{read} read, the slowest in {longest:.3} s");
+        assert!(read > 0 && longest < 2.0, "{read} {longest}");
+    }
+
+    /// A dataset of a terabyte of which no byte is stored, and one that claims four billion rows.
+    #[test]
+    fn a_file_that_claims_more_than_it_can_hold_is_refused_before_it_is_read() {
+        let whole =
+            std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/fixtures/records/hollow_73.mat"));
+        let begun = std::time::Instant::now();
+        let said = Sheet::parse(Path::new("hollow.mat"), whole.unwrap(), &Options::default())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            said.contains("`v_out` of the MAT file is larger than a record"),
+            "{said}"
+        );
+        assert!(begun.elapsed().as_secs_f64() < 1.0);
     }
 
     #[test]

@@ -157,6 +157,12 @@ impl Contract {
         Ok((check(&files, &self.path)?, files))
     }
 
+    /// Text of the contract, with golden vectors named, and the files beside it that are taken over as they are.
+    #[must_use]
+    pub fn sources(&self) -> (&str, &Files) {
+        (&self.text, &self.beside)
+    }
+
     /// SHA-256 of the contract and the files beside it.
     #[must_use]
     pub fn digest(&self) -> [u8; 32] {

@@ -360,7 +360,7 @@ pub struct Diagnose {
     #[arg(long)]
     pub settled: bool,
     /// policy.toml with a mapping, or the folder that holds it: its mapping is refitted from the extended model, and the
-    /// loop closed on that model with both
+    /// loop closed on that model with both. With --retrain one without a mapping will do
     #[arg(long, value_name = "POLICY")]
     pub policy: Option<PathBuf>,
     /// Load steps of the closed loop, as for `simulate`; without it from the records' loads
@@ -369,7 +369,14 @@ pub struct Diagnose {
     /// The converter that the policy was trained on; without it the model
     #[arg(long, value_name = "PLANT", requires = "policy")]
     pub trained_on: Option<PathBuf>,
-    /// Folder for diagnosis.json, plant.extended.toml, report.html and, with a policy, drm.toml
+    /// Training file: where causes are named, a policy is trained anew on the extended model, with the errors of sensors taken
+    /// out by its contract, and compared with that of --policy. Everything of it goes to `retrain` in DIR
+    #[arg(long, value_name = "FILE")]
+    pub retrain: Option<PathBuf>,
+    /// Go on with the training that an interrupted `--retrain` left in DIR, bit for bit
+    #[arg(long, requires = "retrain")]
+    pub resume: bool,
+    /// Folder for diagnosis.json, plant.extended.toml, report.html, experiments and, with a policy, drm.toml
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
 }

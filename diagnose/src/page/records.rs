@@ -1,5 +1,7 @@
 //! Pictures of records: measured, simulated, and the difference over time and operating point.
 
+use std::ops::Range;
+
 use report::{Axis, Chart, Panel, ReportError, Section, Series, Svg};
 
 use super::colours::{EXTENDED, MEASURED, MODEL};
@@ -33,8 +35,10 @@ fn panels(
     record: usize,
     second: Option<&str>,
     also: &[usize],
+    rows: Range<usize>,
 ) -> Result<Svg, ReportError> {
     let one = &problem.records[record];
+    let time = &one.time[rows.clone()];
     let axis = if one.settled && !one.repeated {
         Axis::new("point")
     } else {
@@ -49,8 +53,8 @@ fn panels(
         if !one.measured[n].iter().any(|v| v.is_finite()) {
             continue;
         }
-        let measured = &one.measured[n];
-        let points = Series::points("measured", one.time.clone(), measured.clone()).colour(MEASURED);
+        let measured = &one.measured[n][rows.clone()];
+        let points = Series::points("measured", time, measured).colour(MEASURED);
         let mut panel = Panel::new(Axis::new(CHANNEL_NAMES[n]).unit(CHANNEL_UNITS[n]))
             .height(150.0)
             .series(points);
@@ -58,20 +62,16 @@ fn panels(
         let mut left = Panel::new(axis).height(100.0);
         let mut is_compared = false;
         for (name, state, colour) in states.iter().copied() {
-            let error = errors(problem, state, record, n);
+            let error = &errors(problem, state, record, n)[rows.clone()];
             // a channel of a held-out record that no training record has is not compared, for nobody knows its noise; and a
             // simulation that left every number has no line
             if !error.iter().any(|error| error.is_finite()) {
                 continue;
             }
             is_compared = true;
-            let simulated: Vec<f64> = measured
-                .iter()
-                .zip(&error)
-                .map(|(shown, error)| shown - error)
-                .collect();
-            panel = panel.series(Series::line(name, one.time.clone(), simulated).colour(colour));
-            left = left.series(Series::line(name, one.time.clone(), error).colour(colour));
+            let simulated: Vec<f64> = measured.iter().zip(error).map(|(shown, error)| shown - error).collect();
+            panel = panel.series(Series::line(name, time, simulated).colour(colour));
+            left = left.series(Series::line(name, time, error).colour(colour));
         }
         chart = chart.panel(panel);
         if is_compared {
@@ -86,11 +86,33 @@ fn channels(also: &[usize]) -> impl Iterator<Item = usize> {
     (0..CHANNELS).filter(move |n| *n < 2 || also.contains(n))
 }
 
-/// Channels of a training record in which structure is left.
-fn structured(diagnosis: &Diagnosis, record: &str) -> Vec<usize> {
-    let own = diagnosis.findings.structure.iter().filter(|one| one.record == record);
-    own.filter_map(|one| CHANNEL_NAMES.iter().position(|name| *name == one.channel))
-        .collect()
+/// Mean square over that of the noise from which on a picture of a channel shows more than noise: the errors are 1.6 times as large, as in
+/// [`crate::shape`].
+const MORE_THAN_NOISE: f64 = 2.5;
+
+/// Channels of a record in which one of both models leaves more than noise.
+pub(super) fn unsettled(problem: &Problem, states: [&State; 2], record: usize) -> Vec<usize> {
+    let is_more = |n: &usize| {
+        let square = |state: &&State| {
+            let errors = channel(problem, &state.residual, record, *n);
+            let counted: Vec<f64> = errors.into_iter().filter(|error| *error != 0.0).collect();
+            counted.iter().map(|error| error * error).sum::<f64>() / counted.len().max(1) as f64
+        };
+        states.iter().any(|state| square(state) > MORE_THAN_NOISE)
+    };
+    (0..CHANNELS).filter(is_more).collect()
+}
+
+/// Channels of a training record in which structure is left, or one of both models leaves more than noise.
+fn structured(diagnosis: &Diagnosis, record: usize) -> Vec<usize> {
+    let name = &diagnosis.problem.records[record].name;
+    let own = diagnosis.findings.structure.iter().filter(|one| one.record == *name);
+    let mut list: Vec<usize> = own
+        .filter_map(|one| CHANNEL_NAMES.iter().position(|name| *name == one.channel))
+        .collect();
+    let states = [&diagnosis.given, diagnosis.attribution.state()];
+    list.extend(unsettled(&diagnosis.problem, states, record));
+    list
 }
 
 /// Adds the pictures of a record, and says which simulation has no line in them.
@@ -103,7 +125,8 @@ pub(super) fn pictures(
     also: &[usize],
     caption: &str,
 ) -> Section {
-    let mut section = section.chart_or_reason(panels(problem, before, after, record, second, also), caption);
+    let rows = 0..problem.records[record].rows();
+    let mut section = section.chart_or_reason(panels(problem, before, after, record, second, also, rows), caption);
     let states = std::iter::once(("model", before)).chain(second.map(|name| (name, after)));
     for (name, state) in states {
         // channels without any line, and those whose line has gaps
@@ -143,6 +166,27 @@ pub(super) fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
     })
 }
 
+/// Rows of a picture from near: each has ten pixels, so that what a sensor or a delay does from row to row is seen.
+const NEAR: usize = 60;
+
+/// The rows around the largest error of a record over time that is long enough to have a picture from near.
+fn stretch(problem: &Problem, state: &State, record: usize) -> Option<Range<usize>> {
+    let one = &problem.records[record];
+    if one.rows() < 3 * NEAR || one.settled {
+        return None;
+    }
+    let size = |row: usize| {
+        let own = (0..CHANNELS).map(|n| state.residual[problem.offsets[record] + row * CHANNELS + n]);
+        // what the simulation left has no size that says where it began to
+        own.map(|v| if v.is_finite() && v.abs() < LOST { v.abs() } else { 0.0 })
+            .fold(0.0, f64::max)
+    };
+    let most = (0..one.rows()).max_by(|a, b| size(*a).total_cmp(&size(*b)))?;
+    // what led to it stands before
+    let first = most.saturating_sub(NEAR / 3).min(one.rows() - NEAR);
+    Some(first..first + NEAR)
+}
+
 /// The training records that are no captures; nothing if there is none.
 pub(super) fn training(diagnosis: &Diagnosis) -> Option<Section> {
     let (problem, before, after) = (&diagnosis.problem, &diagnosis.given, diagnosis.attribution.state());
@@ -156,7 +200,7 @@ pub(super) fn training(diagnosis: &Diagnosis) -> Option<Section> {
     let worst = all().max_by(|a, b| square(*a).total_cmp(&square(*b)))?;
     let caption =
         "The training record that the model as given misses most. Initial states are estimated for each model.";
-    let also = |record: usize| structured(diagnosis, &problem.records[record].name);
+    let also = |record: usize| structured(diagnosis, record);
     let title = match second {
         Some("extended") => "Measured, simulated, extended",
         _ => "Training records, measured and simulated",
@@ -171,6 +215,12 @@ pub(super) fn training(diagnosis: &Diagnosis) -> Option<Section> {
         &also(worst),
         caption,
     );
+    if let Some(rows) = stretch(problem, before, worst) {
+        section = section.chart_or_reason(
+            panels(problem, before, states[1], worst, second, &also(worst), rows),
+            "The same from near: the rows around the largest error of the model as given.",
+        );
+    }
     let models = spectrum::models(before, after, second);
     let measured = |n: &usize| problem.records[worst].measured[*n].iter().any(|v| v.is_finite());
     let shown: Vec<usize> = channels(&also(worst)).filter(measured).collect();

@@ -3,6 +3,8 @@
 
 #![allow(dead_code, reason = "each test program uses its part")]
 
+pub mod control;
+
 use std::fmt::Write as _;
 use std::path::Path;
 

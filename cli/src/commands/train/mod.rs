@@ -76,6 +76,14 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     report(options, &settings, &runs, best, start.elapsed())
 }
 
+/// Whether a training of these seeds may go to `out`.
+///
+/// # Errors
+/// If it holds a policy, or an interrupted training that is not to be resumed; or nothing to resume.
+pub fn ready(out: &Path, seeds: &[u64], resume: bool) -> Result<(), Failure> {
+    Kept::new(out).prepare(seeds, resume).map(|_| ())
+}
+
 /// Reads every file that is named, and trains nothing.
 ///
 /// # Errors

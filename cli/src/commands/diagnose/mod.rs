@@ -1,5 +1,7 @@
 //! `policyc diagnose`
 
+mod retrain;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -7,15 +9,18 @@ use std::time::Instant;
 
 use ::diagnose::control::Request;
 use ::diagnose::diagnosis::{Diagnosis, diagnose};
+use ::diagnose::played;
 use ::diagnose::progress::Progress;
 use ::diagnose::record::{Record, open_all};
 use ::diagnose::results::{self, Asked};
+use ::diagnose::retrain::Refusal;
+use ::diagnose::retrain::judged::Advice;
 use closed_loop::Scenario;
 use closed_loop::scenario::Task;
 use drm::formula::Losses;
 use measured::ColumnMap;
-use plant::{Faults, Parameters};
-use toml_input::FileName;
+use plant::{Faults, Parameters, Topology};
+use toml_input::{FileName, Message};
 
 use super::progress_line::{Pace, ProgressLine};
 use super::simulate;
@@ -28,21 +33,18 @@ use crate::talk;
 /// Reads the records, diagnoses, writes the three files.
 pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     let columns = columns(options)?;
+    let training = retrain::prepare(options)?;
     let shown = Mutex::new(Shown::new(Instant::now()));
     let say = |what: Progress<'_>| {
         if let Ok(mut shown) = shown.lock() {
             shown.hear(what);
         }
     };
-    let diagnosis = found(options, &columns, &say)?;
+    let mut diagnosis = found(options, &columns, &say)?;
     if let Ok(mut shown) = shown.lock() {
         shown.line.clear();
     }
-    output::replace_own_texts(
-        &options.out,
-        &results::files_of(&diagnosis, &asked(options))?,
-        options.replacing,
-    )?;
+    write(options, &diagnosis)?;
     let named: Vec<&Path> = options
         .train
         .iter()
@@ -53,12 +55,61 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     if lines.len() > 1 {
         lines.push(String::new());
     }
+    if !diagnosis.findings.next_experiments.is_empty() {
+        let out = options.out.display();
+        lines.push(format!(
+            "next experiments, as files for the bench: {out}/{}",
+            played::FOLDER
+        ));
+    }
     lines.push(format!("to look at: {}/report.html", options.out.display()));
     output::say(&lines.join("\n"))?;
-    Ok(match diagnosis.findings.compared.leaves_out() {
+    let own = match diagnosis.findings.compared.leaves_out() {
         true => Outcome::Different,
         false => Outcome::Done,
-    })
+    };
+    match training {
+        Some(prepared) => retrained(options, &prepared, &mut diagnosis, own),
+        None => Ok(own),
+    }
+}
+
+/// Writes all files of the diagnosis.
+fn write(options: &Diagnose, diagnosis: &Diagnosis) -> Result<(), Failure> {
+    let files = results::files_of(diagnosis, &asked(options))?;
+    output::replace_own_texts(&options.out, &files, options.replacing)
+}
+
+/// Trains anew, writes page and JSON again with what came of it, and says so. Without a policy to take the answer is no.
+fn retrained(
+    options: &Diagnose,
+    prepared: &retrain::Prepared,
+    diagnosis: &mut Diagnosis,
+    own: Outcome,
+) -> Result<Outcome, Failure> {
+    let (ended, text) = match retrain::run(options, prepared, diagnosis)? {
+        retrain::Ended::Interrupted => {
+            output::say("\nor the same `policyc diagnose` with --resume, which compares the policies at the end")?;
+            return Ok(Outcome::Interrupted);
+        }
+        retrain::Ended::Refused(refusal) => {
+            let words = format!("Not trained anew. {}", refusal.words());
+            diagnosis.findings.gain.retrained_missing = Some(words.clone());
+            let is_right = refusal == Refusal::Nothing;
+            (if is_right { own } else { Outcome::Different }, words)
+        }
+        retrain::Ended::Judged(judged, missed) => {
+            let found = judged.findings.clone();
+            let worse = missed || found.advice == Advice::Old;
+            let text = format!("trained anew: {}", found.sentence);
+            diagnosis.findings.gain.retrained = Some(found);
+            diagnosis.retrained = Some(*judged);
+            (if worse { Outcome::Different } else { own }, text)
+        }
+    };
+    write(options, diagnosis)?;
+    output::say(&format!("\n{text}\nreport: {}/report.html", options.out.display()))?;
+    Ok(ended)
 }
 
 /// Name and text of every file of a diagnosis; nothing is written or said.
@@ -66,6 +117,12 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
 /// # Errors
 /// As [`run`].
 pub fn files(options: &Diagnose) -> Result<BTreeMap<String, String>, Failure> {
+    if options.retrain.is_some() {
+        let message = Message::new("a training writes its files itself, and none are handed over");
+        return Err(message
+            .hint("leave --retrain out, and train on plant.extended.toml")
+            .into());
+    }
     let found = found(options, &columns(options)?, &|_| {})?;
     Ok(results::files_of(&found, &asked(options))?)
 }
@@ -79,6 +136,7 @@ pub fn check(options: &Diagnose) -> Result<(), Failure> {
     if let Some(policy) = &options.policy {
         request(options, policy, &model)?;
     }
+    retrain::prepare(options)?;
     records(options, &columns(options)?, &model)?;
     Ok(())
 }
@@ -86,6 +144,8 @@ pub fn check(options: &Diagnose) -> Result<(), Failure> {
 /// The model; a mapping is refitted for the buck alone.
 fn model(options: &Diagnose) -> Result<Parameters, Faults> {
     match options.policy {
+        // a policy may be there to be trained anew and to be compared, with a mapping or without one
+        Some(_) if options.retrain.is_some() => Parameters::from_file(&options.model),
         Some(_) => Parameters::buck_from_file(&options.model, "`diagnose --policy`"),
         None => Parameters::from_file(&options.model),
     }
@@ -97,6 +157,7 @@ fn asked(options: &Diagnose) -> Asked {
     let files = [
         ("--columns", &options.columns.columns),
         ("--policy", &options.policy),
+        ("--retrain", &options.retrain),
         ("--scenario", &options.scenario),
         ("--trained-on", &options.trained_on),
     ];
@@ -132,7 +193,8 @@ fn found(options: &Diagnose, columns: &ColumnMap, say: &(dyn Fn(Progress<'_>) + 
         .policy
         .as_deref()
         .map(|policy| request(options, policy, &model))
-        .transpose()?;
+        .transpose()?
+        .flatten();
     say(Progress::Stage("reading the records"));
     let (train, heldout) = records(options, columns, &model)?;
     let mut diagnosis = diagnose(&model, train, &heldout, say);
@@ -179,9 +241,13 @@ impl Shown {
     }
 }
 
-/// The policy and what is asked of it.
-fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Request, Failure> {
+/// The policy and what is asked of it; nothing of one without a mapping that is there to be trained anew.
+fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Option<Request>, Failure> {
     let policy = super::load(path, options.outside)?;
+    let is_buck = model.converter.topology == Topology::Buck;
+    if options.retrain.is_some() && (policy.mapping.is_none() || !is_buck) {
+        return Ok(None);
+    }
     super::drm::needs_mapping(&policy)?;
     let (trained_on, file) = match &options.trained_on {
         Some(path) => (Parameters::buck_from_file(path, "`diagnose --policy`")?, path),
@@ -193,7 +259,7 @@ fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Reques
     for (converter, file) in [(&trained_on, file), (model, &options.model)] {
         simulate::suits(&policy, converter, v_ref, file)?;
     }
-    Ok(Request {
+    Ok(Some(Request {
         losses: Losses::of(&trained_on)?,
         policy,
         trained_on,
@@ -202,7 +268,7 @@ fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Reques
             .as_ref()
             .map_or_else(Vec::new, |scenario| scenario.load_steps.clone()),
         task: scenario.map_or_else(short_task, |scenario| scenario.task),
-    })
+    }))
 }
 
 /// Eight instants are enough to compare two mappings.

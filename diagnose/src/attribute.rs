@@ -43,15 +43,13 @@ pub struct Attribution {
 /// their instants free.
 #[must_use]
 pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, Attribution) {
+    if crate::balance::broken(&problem).is_some() {
+        // no cause mends them: a search would take its longest and find nothing
+        return without_search(problem, null);
+    }
     let candidates = candidates(&problem.base.plant, &problem.bases);
     let basis = problem.basis(&null.model, &null.starts, &null.residual);
     let search = searcher(&problem, &candidates, &basis, &null, say);
-    if crate::balance::broken(&problem).is_some() {
-        // no cause mends them: a search would take its longest and find nothing
-        let unmoved = (0..candidates.len()).map(|cause| search.fitter.unmoved(cause, 0.0));
-        let attribution = completed(&search, unmoved.collect(), (None, Vec::new()));
-        return (problem, attribution);
-    }
     let singles = search.singles("each cause alone");
     let Some((freed, near)) = needs_instants(&search, &singles) else {
         let found = search.grow(&singles);
@@ -91,6 +89,17 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
             (freed, attribution)
         }
     }
+}
+
+/// The model as given, of which it is known that no cause mends it.
+#[must_use]
+pub fn without_search(problem: Problem, null: State) -> (Problem, Attribution) {
+    let candidates = candidates(&problem.base.plant, &problem.bases);
+    let basis = problem.basis(&null.model, &null.starts, &null.residual);
+    let search = searcher(&problem, &candidates, &basis, &null, &|_| ());
+    let unmoved = (0..candidates.len()).map(|cause| search.fitter.unmoved(cause, 0.0));
+    let attribution = completed(&search, unmoved.collect(), (None, Vec::new()));
+    (problem, attribution)
 }
 
 fn searcher<'a>(

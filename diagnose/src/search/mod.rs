@@ -31,6 +31,9 @@ const SWAP: f64 = 2.0;
 /// Starts of one cause that are followed. What looks best at first order is not always where the fit ends best, and each more
 /// costs a fit. A convention.
 const BEGUN: usize = 2;
+/// Single causes whose fit is brought to its end after its first steps, whatever they leave: twice the leaders that anything asks for.
+/// What is behind them leads nothing. A convention.
+const BROUGHT_TO_AN_END: usize = 10;
 /// Most causes named. Records of one converter hold 5 to 15 independent directions; blind cases hide at most two effects, and the
 /// third place is for one that a second imitates in part.
 const MOST: usize = 3;
@@ -112,13 +115,46 @@ impl Searcher<'_> {
             _ => gained(&self.fitter.sensitivity(*cause, null), &null.residual),
         });
         let most = first_order.iter().copied().fold(0.0, f64::max);
-        progress::map(self.say, stage, &all, |cause| {
-            let follow = first_order[*cause] > (FOLLOWED * most).max(LEAST_FOLLOWED);
-            if self.begins_at_own(*cause) && !follow {
-                return self.fitter.unmoved(*cause, first_order[*cause]);
+        let is_followed = |cause: usize| {
+            !self.begins_at_own(cause) || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED)
+        };
+        let looked = progress::map(self.say, stage, &all, |cause| match is_followed(*cause) {
+            true => self.looked_at(*cause),
+            false => self.fitter.unmoved(*cause, first_order[*cause]),
+        });
+        let near = self.near_the_best(&looked);
+        progress::map(self.say, &format!("{stage}, those that come near"), &all, |cause| {
+            let fit = &looked[*cause];
+            if !is_followed(*cause) || !near.contains(cause) {
+                return fit.clone();
             }
-            self.added(&Set::NONE, *cause, null)
+            let further = self.fitter.from(&fit.causes, &fit.values, &fit.state);
+            if further.state.chi2 < fit.state.chi2 {
+                further
+            } else {
+                fit.clone()
+            }
         })
+    }
+
+    /// A candidate alone after the first steps of its fit, which show whether it can come near.
+    fn looked_at(&self, cause: usize) -> Fit {
+        let null = self.fitter.null;
+        let begins = self.begins(&Set::NONE, cause, null).into_iter().take(BEGUN);
+        let fits = begins.map(|(_, start)| self.fitter.first_steps(&[cause], &start, null));
+        let best = fits.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+        best.unwrap_or_else(|| self.fitter.unmoved(cause, 0.0))
+    }
+
+    /// Places of those that lead, and of those that may fit as well as the first in the end.
+    fn near_the_best(&self, looked: &[Fit]) -> Vec<usize> {
+        let mut places = self.leaders(looked, BROUGHT_TO_AN_END);
+        let least = looked.iter().map(|fit| fit.state.chi2).fold(f64::INFINITY, f64::min);
+        let explained = self.fitter.null.chi2 - least;
+        // as far as a rival may be off, and as much again as the best leaves for what the first steps have not reached
+        let farthest = least + least.max(NEAR * TIE_SHARE * explained);
+        places.extend((0..looked.len()).filter(|place| looked[*place].state.chi2 < farthest));
+        places
     }
 
     /// Chi-square with a price for each parameter.
@@ -166,7 +202,11 @@ impl Searcher<'_> {
             return (None, Vec::new());
         };
         let mut best = self.polished(first);
-        while best.causes.len() < MOST && best.values.len() < most && !self.is_hopeless(&best) {
+        while best.causes.len() < MOST
+            && best.values.len() < most
+            && !self.is_hopeless(&best)
+            && !self.is_out_of_reach(&best)
+        {
             let stage = format!("more than {}", self.names(&best));
             let mut larger = self.forward(&best, LOOKED_AT, &stage);
             // two causes that resemble each other are best found from the one that explains less alone

@@ -66,7 +66,7 @@ impl Searcher<'_> {
     }
 
     /// Where the fit of a candidate may begin; what the residual itself tells is read off it.
-    fn starts(&self, cause: usize, from: &State) -> Vec<Vec<f64>> {
+    pub(super) fn starts(&self, cause: usize, from: &State) -> Vec<Vec<f64>> {
         let (problem, residual) = (self.fitter.problem, &from.residual);
         match self.search(cause) {
             Search::Line => {

@@ -138,6 +138,12 @@ fn needs_instants(search: &Searcher<'_>, singles: &[Fit]) -> Option<(Problem, St
     is_as_good.then_some((freed, inside))
 }
 
+/// Whether a fit leaves what noise does not.
+fn leaves_structure(search: &Searcher<'_>, fit: &Fit) -> bool {
+    let fitter = &search.fitter;
+    !structures(fitter.problem, fitter.null, &fit.state, search.inflation(fit)).is_empty()
+}
+
 /// The causes that `search` has found, and the evidence of each, with all that goes with them.
 fn completed(search: &Searcher<'_>, singles: Vec<Fit>, (best, evidence): (Option<Fit>, Vec<f64>)) -> Attribution {
     let (problem, null) = (search.fitter.problem, search.fitter.null);
@@ -145,10 +151,9 @@ fn completed(search: &Searcher<'_>, singles: Vec<Fit>, (best, evidence): (Option
         Some(fit) => search.inflation(fit),
         None => noise::inflation(problem, &null.residual),
     };
-    // what leaves structure explains nothing, and nobody asks what would explain it as well
-    let leaves_structure = |fit: &Fit| !structures(problem, null, &fit.state, inflation).is_empty();
     let rivals = match &best {
-        Some(fit) if leaves_structure(fit) => vec![Vec::new(); fit.causes.len()],
+        // what leaves structure explains nothing, and nobody asks what would explain it as well
+        Some(fit) if leaves_structure(search, fit) => vec![Vec::new(); fit.causes.len()],
         Some(fit) => search.rivals(fit, &evidence, &singles),
         None => Vec::new(),
     };

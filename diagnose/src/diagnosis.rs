@@ -243,7 +243,7 @@ fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<Str
     odd.extend(spikes(problem, &found.outliers));
     odd.extend(sources);
     let mut near = String::new();
-    if !explained {
+    if !explained && !found.is_misread() {
         odd.extend(other_carrier(problem, attribution));
         near = nearest(&found.named, attribution.removed(problem)) + &other_carrier_said(found);
     }

@@ -120,7 +120,8 @@ impl Reading {
             // a duty that stands still is another by 1 - 2 d, which a source voltage or an offset may be as well; one that moves goes the
             // other way
             Reading::OtherSwitch => {
-                let (low, high) = (record.duty.iter()).fold((1.0f64, 0.0f64), |(low, high), d| (low.min(*d), high.max(*d)));
+                let (low, high) =
+                    (record.duty.iter()).fold((1.0f64, 0.0f64), |(low, high), d| (low.min(*d), high.max(*d)));
                 high - low >= (1.0 - 2.0 * median(record.duty.iter().copied())).abs()
             }
         }
@@ -192,10 +193,14 @@ fn tried(problem: &Problem, null: &State, index: usize) -> Vec<Reading> {
     // points of a table have no neighbours in time
     let mut list: Vec<Reading> = in_time.filter(|_| !record.settled).collect();
     for n in (0..CHANNELS).filter(|n| has(*n)) {
-        list.extend((PROBES.into_iter()).map(|times| Reading::Probe(n, times)).filter(|reading| match reading {
-            Reading::Probe(n, times) => is_nearer(problem, null, index, (*n, *times)),
-            _ => false,
-        }));
+        list.extend(
+            (PROBES.into_iter())
+                .map(|times| Reading::Probe(n, times))
+                .filter(|reading| match reading {
+                    Reading::Probe(n, times) => is_nearer(problem, null, index, (*n, *times)),
+                    _ => false,
+                }),
+        );
     }
     list.push(Reading::OtherSwitch);
     let own = null.model.plant.converter.topology;
@@ -209,10 +214,15 @@ fn tried(problem: &Problem, null: &State, index: usize) -> Vec<Reading> {
 fn is_nearer(problem: &Problem, null: &State, index: usize, (n, times): (usize, f64)) -> bool {
     let left = noise::channel(problem, &null.residual, index, n);
     let rows = left.iter().zip(&problem.records[index].measured[n]);
-    let errors = rows.filter(|(left, value)| **left != 0.0 && value.is_finite()).map(|(left, value)| {
-        let shown = value / problem.sigma[n];
-        (left * left, ((shown - times * (shown - left)) * (shown - times * (shown - left))))
-    });
+    let errors = rows
+        .filter(|(left, value)| **left != 0.0 && value.is_finite())
+        .map(|(left, value)| {
+            let shown = value / problem.sigma[n];
+            (
+                left * left,
+                ((shown - times * (shown - left)) * (shown - times * (shown - left))),
+            )
+        });
     let (own, other) = errors.fold((0.0, 0.0), |(a, b), (own, other)| (a + own, b + other));
     other < own
 }

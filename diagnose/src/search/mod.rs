@@ -115,9 +115,8 @@ impl Searcher<'_> {
             _ => gained(&self.fitter.sensitivity(*cause, null), &null.residual),
         });
         let most = first_order.iter().copied().fold(0.0, f64::max);
-        let is_followed = |cause: usize| {
-            !self.begins_at_own(cause) || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED)
-        };
+        let is_followed =
+            |cause: usize| !self.begins_at_own(cause) || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED);
         let looked = progress::map(self.say, stage, &all, |cause| match is_followed(*cause) {
             true => self.looked_at(*cause),
             false => self.fitter.unmoved(*cause, first_order[*cause]),

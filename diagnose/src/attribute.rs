@@ -11,7 +11,7 @@ use crate::parallel;
 use crate::problem::{Problem, dot};
 use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
-use crate::search::{Searcher, TIE, gained};
+use crate::search::{Known, Searcher, TIE, gained};
 use crate::shape::structures;
 
 /// Causes that are fitted with free instants from where they fit without. As many as are fitted after a linear look in the search: a
@@ -111,6 +111,7 @@ fn searcher<'a>(
 ) -> Searcher<'a> {
     Searcher {
         say,
+        known: Known::default(),
         fitter: Fitter {
             problem,
             candidates,

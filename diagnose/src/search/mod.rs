@@ -3,6 +3,8 @@
 mod starts;
 mod weigh;
 
+pub(crate) use starts::Known;
+
 use crate::causes::Search;
 use crate::fit::{FINE, Fit, Fitter, State};
 use crate::level::{ACCURACY, threshold};
@@ -34,6 +36,8 @@ const BEGUN: usize = 2;
 /// Single causes whose fit is brought to its end after its first steps, whatever they leave: twice the leaders that anything asks for.
 /// What is behind them leads nothing. A convention.
 const BROUGHT_TO_AN_END: usize = 10;
+/// Mean square over that of the noise from which on the best single cause leaves structure for sure, in `shape` from 2.5 on.
+const STILL_FAR: f64 = 4.0;
 /// Most causes named. Records of one converter hold 5 to 15 independent directions; blind cases hide at most two effects, and the
 /// third place is for one that a second imitates in part.
 const MOST: usize = 3;
@@ -50,6 +54,8 @@ pub(crate) struct Searcher<'a> {
     pub fitter: Fitter<'a>,
     /// Hears how far it is.
     pub say: Listener<'a>,
+    /// What its looks share.
+    pub known: Known,
 }
 
 /// A fitted set, and the sensitivities of its parameters where it ends.
@@ -150,6 +156,10 @@ impl Searcher<'_> {
         let mut places = self.leaders(looked, BROUGHT_TO_AN_END);
         let least = looked.iter().map(|fit| fit.state.chi2).fold(f64::INFINITY, f64::min);
         let explained = self.fitter.null.chi2 - least;
+        // what leaves structure has no rivals
+        if least > STILL_FAR * self.fitter.problem.count() as f64 {
+            return places;
+        }
         // as far as a rival may be off, and as much again as the best leaves for what the first steps have not reached
         let farthest = least + least.max(NEAR * TIE_SHARE * explained);
         places.extend((0..looked.len()).filter(|place| looked[*place].state.chi2 < farthest));

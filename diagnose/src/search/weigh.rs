@@ -96,15 +96,19 @@ impl Searcher<'_> {
         if self.search(cause) == Search::Own {
             return self.fitter.sensitivity(cause, from);
         }
-        let each = self.starts(cause, from).into_iter().flat_map(|start| {
-            let there = self.fitter.state_at(&[cause], &start, from, 0).0;
-            let mut way = from.residual.clone();
-            axpy(&mut way, -1.0, &there.residual);
-            self.fitter.basis.project(&mut way);
-            let mut list = self.fitter.sensitivity(cause, &there);
-            list.push(way);
-            list
-        });
+        let each = self
+            .starts(cause, from)
+            .into_iter()
+            .enumerate()
+            .flat_map(|(place, start)| {
+                let there = self.fitter.state_at(&[cause], &start, from, 0).0;
+                let mut way = from.residual.clone();
+                axpy(&mut way, -1.0, &there.residual);
+                self.fitter.basis.project(&mut way);
+                let mut list = self.tangents(cause, place, &there).to_vec();
+                list.push(way);
+                list
+            });
         each.collect()
     }
 

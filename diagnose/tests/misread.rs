@@ -96,7 +96,7 @@ fn another_kind_of_converter_is_named_at_one_duty() {
     let mut random = Noise(63);
     let bench = Bench {
         wiring: Wiring::BuckBoost,
-        duty: vec![(0, 0.4)],
+        duty: vec![(0, 0.3)],
         esr: 0.002,
         ..small()
     };

@@ -1,5 +1,6 @@
 //! The search for a set of causes: forward with several leaders, exchange, backward, and what would do as well.
 
+mod singles;
 mod starts;
 mod weigh;
 
@@ -33,11 +34,6 @@ const SWAP: f64 = 2.0;
 /// Starts of one cause that are followed. What looks best at first order is not always where the fit ends best, and each more
 /// costs a fit. A convention.
 const BEGUN: usize = 2;
-/// Single causes whose fit is brought to its end after its first steps, whatever they leave: twice the leaders that anything asks for.
-/// What is behind them leads nothing. A convention.
-const BROUGHT_TO_AN_END: usize = 10;
-/// Mean square over that of the noise from which on the best single cause leaves structure for sure, in `shape` from 2.5 on.
-const STILL_FAR: f64 = 4.0;
 /// Most causes named. Records of one converter hold 5 to 15 independent directions; blind cases hide at most two effects, and the
 /// third place is for one that a second imitates in part.
 const MOST: usize = 3;
@@ -107,63 +103,6 @@ impl Searcher<'_> {
     fn names(&self, fit: &Fit) -> String {
         let names: Vec<&str> = fit.causes.iter().map(|cause| self.id(*cause)).collect();
         names.join(" + ")
-    }
-
-    /// Every candidate alone. Those that explain next to nothing at first order are not followed further.
-    pub fn singles(&self, stage: &str) -> Vec<Fit> {
-        let null = self.fitter.null;
-        let all: Vec<usize> = (0..self.fitter.candidates.len()).collect();
-        let first_order = parallel::map(&all, |cause| match self.search(*cause) {
-            Search::OwnOr(_) => {
-                let best = self.begins(&Set::NONE, *cause, null).into_iter().next();
-                best.map_or(0.0, |(expected, _)| null.chi2 - expected)
-            }
-            _ => gained(&self.fitter.sensitivity(*cause, null), &null.residual),
-        });
-        let most = first_order.iter().copied().fold(0.0, f64::max);
-        let is_followed =
-            |cause: usize| !self.begins_at_own(cause) || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED);
-        let looked = progress::map(self.say, stage, &all, |cause| match is_followed(*cause) {
-            true => self.looked_at(*cause),
-            false => self.fitter.unmoved(*cause, first_order[*cause]),
-        });
-        let near = self.near_the_best(&looked);
-        progress::map(self.say, &format!("{stage}, those that come near"), &all, |cause| {
-            let fit = &looked[*cause];
-            if !is_followed(*cause) || !near.contains(cause) {
-                return fit.clone();
-            }
-            let further = self.fitter.from(&fit.causes, &fit.values, &fit.state);
-            if further.state.chi2 < fit.state.chi2 {
-                further
-            } else {
-                fit.clone()
-            }
-        })
-    }
-
-    /// A candidate alone after the first steps of its fit, which show whether it can come near.
-    fn looked_at(&self, cause: usize) -> Fit {
-        let null = self.fitter.null;
-        let begins = self.begins(&Set::NONE, cause, null).into_iter().take(BEGUN);
-        let fits = begins.map(|(_, start)| self.fitter.first_steps(&[cause], &start, null));
-        let best = fits.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
-        best.unwrap_or_else(|| self.fitter.unmoved(cause, 0.0))
-    }
-
-    /// Places of those that lead, and of those that may fit as well as the first in the end.
-    fn near_the_best(&self, looked: &[Fit]) -> Vec<usize> {
-        let mut places = self.leaders(looked, BROUGHT_TO_AN_END);
-        let least = looked.iter().map(|fit| fit.state.chi2).fold(f64::INFINITY, f64::min);
-        let explained = self.fitter.null.chi2 - least;
-        // what leaves structure has no rivals
-        if least > STILL_FAR * self.fitter.problem.count() as f64 {
-            return places;
-        }
-        // as far as a rival may be off, and as much again as the best leaves for what the first steps have not reached
-        let farthest = least + least.max(NEAR * TIE_SHARE * explained);
-        places.extend((0..looked.len()).filter(|place| looked[*place].state.chi2 < farthest));
-        places
     }
 
     /// Chi-square with a price for each parameter.

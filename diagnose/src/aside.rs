@@ -111,7 +111,7 @@ pub fn explained_without(
     say: Listener<'_>,
 ) -> Option<Rest> {
     let is_short = |record: &Record| record.settled || record.rows() < FEWEST_ROWS;
-    if whole.verdict != Verdict::Unexplained || records.iter().any(is_short) {
+    if whole.verdict != Verdict::Unexplained || whole.is_misread() || records.iter().any(is_short) {
         return None;
     }
     let looks = match whole.structure.is_empty() {

@@ -11,7 +11,7 @@ use crate::parallel;
 use crate::problem::{Problem, dot};
 use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
-use crate::search::{Searcher, TIE, gained};
+use crate::search::{Known, Searcher, TIE, gained};
 use crate::shape::structures;
 
 /// Causes that are fitted with free instants from where they fit without. As many as are fitted after a linear look in the search: a
@@ -43,15 +43,13 @@ pub struct Attribution {
 /// their instants free.
 #[must_use]
 pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, Attribution) {
+    if crate::balance::broken(&problem).is_some() {
+        // no cause mends them: a search would take its longest and find nothing
+        return without_search(problem, null);
+    }
     let candidates = candidates(&problem.base.plant, &problem.bases);
     let basis = problem.basis(&null.model, &null.starts, &null.residual);
     let search = searcher(&problem, &candidates, &basis, &null, say);
-    if crate::balance::broken(&problem).is_some() {
-        // no cause mends them: a search would take its longest and find nothing
-        let unmoved = (0..candidates.len()).map(|cause| search.fitter.unmoved(cause, 0.0));
-        let attribution = completed(&search, unmoved.collect(), (None, Vec::new()));
-        return (problem, attribution);
-    }
     let singles = search.singles("each cause alone");
     let Some((freed, near)) = needs_instants(&search, &singles) else {
         let found = search.grow(&singles);
@@ -93,6 +91,17 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
     }
 }
 
+/// The model as given, of which it is known that no cause mends it.
+#[must_use]
+pub fn without_search(problem: Problem, null: State) -> (Problem, Attribution) {
+    let candidates = candidates(&problem.base.plant, &problem.bases);
+    let basis = problem.basis(&null.model, &null.starts, &null.residual);
+    let search = searcher(&problem, &candidates, &basis, &null, &|_| ());
+    let unmoved = (0..candidates.len()).map(|cause| search.fitter.unmoved(cause, 0.0));
+    let attribution = completed(&search, unmoved.collect(), (None, Vec::new()));
+    (problem, attribution)
+}
+
 fn searcher<'a>(
     problem: &'a Problem,
     candidates: &'a [Candidate],
@@ -102,6 +111,7 @@ fn searcher<'a>(
 ) -> Searcher<'a> {
     Searcher {
         say,
+        known: Known::default(),
         fitter: Fitter {
             problem,
             candidates,
@@ -129,6 +139,12 @@ fn needs_instants(search: &Searcher<'_>, singles: &[Fit]) -> Option<(Problem, St
     is_as_good.then_some((freed, inside))
 }
 
+/// Whether a fit leaves what noise does not.
+fn leaves_structure(search: &Searcher<'_>, fit: &Fit) -> bool {
+    let fitter = &search.fitter;
+    !structures(fitter.problem, fitter.null, &fit.state, search.inflation(fit)).is_empty()
+}
+
 /// The causes that `search` has found, and the evidence of each, with all that goes with them.
 fn completed(search: &Searcher<'_>, singles: Vec<Fit>, (best, evidence): (Option<Fit>, Vec<f64>)) -> Attribution {
     let (problem, null) = (search.fitter.problem, search.fitter.null);
@@ -136,10 +152,9 @@ fn completed(search: &Searcher<'_>, singles: Vec<Fit>, (best, evidence): (Option
         Some(fit) => search.inflation(fit),
         None => noise::inflation(problem, &null.residual),
     };
-    // what leaves structure explains nothing, and nobody asks what would explain it as well
-    let leaves_structure = |fit: &Fit| !structures(problem, null, &fit.state, inflation).is_empty();
     let rivals = match &best {
-        Some(fit) if leaves_structure(fit) => vec![Vec::new(); fit.causes.len()],
+        // what leaves structure explains nothing, and nobody asks what would explain it as well
+        Some(fit) if leaves_structure(search, fit) => vec![Vec::new(); fit.causes.len()],
         Some(fit) => search.rivals(fit, &evidence, &singles),
         None => Vec::new(),
     };

@@ -101,7 +101,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     });
     let (mut state, mut empirical) = (state, None);
     // causes that leave only noise leave nothing to describe, whatever speaks against them: a term would imitate them
-    if !found.structure.is_empty() && (!explained || set_aside.is_some()) {
+    if !found.structure.is_empty() && !found.is_misread() && (!explained || set_aside.is_some()) {
         say(Progress::Stage("empirical term"));
         let problem = whole_problem.as_ref().unwrap_or(&found.problem);
         empirical = described(problem, heldout, &base, (&mut state.model, trim), &mut pair);
@@ -246,7 +246,7 @@ fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<Str
     odd.extend(spikes(problem, &found.outliers));
     odd.extend(sources);
     let mut near = String::new();
-    if !explained {
+    if !explained && !found.is_misread() {
         odd.extend(other_carrier(problem, attribution));
         near = nearest(&found.named, attribution.removed(problem)) + &other_carrier_said(found);
     }

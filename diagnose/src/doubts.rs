@@ -42,6 +42,8 @@ pub enum Doubt {
     Freedom(String),
     /// No converter of this kind gives the records.
     Kind(String),
+    /// The records look like those of the model in another reading: a fault of the bench.
+    Bench(String),
     /// What stands beside every fit for the edges of the gate is more than edges.
     Edges(String),
 }
@@ -115,7 +117,7 @@ pub fn forbids(named: &[Named], doubts: &[Doubt]) -> bool {
         Doubt::Bound(_) => !named.is_empty(),
         Doubt::Open(_) => !named.is_empty() && !tied,
         Doubt::Freedom(_) | Doubt::HeldOut(..) => false,
-        Doubt::Kind(_) | Doubt::Edges(_) => true,
+        Doubt::Kind(_) | Doubt::Edges(_) | Doubt::Bench(_) => true,
     })
 }
 
@@ -127,6 +129,7 @@ pub fn said(doubts: &[Doubt]) -> Vec<String> {
         | Doubt::Freedom(words)
         | Doubt::HeldOut(_, words)
         | Doubt::Kind(words)
+        | Doubt::Bench(words)
         | Doubt::Edges(words) => words.clone(),
     };
     doubts.iter().map(words).collect()

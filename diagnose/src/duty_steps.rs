@@ -30,8 +30,8 @@ pub(crate) fn likely(problem: &Problem, basis: &Basis, residual: &[f64], count: 
     let numbers: Vec<f64> = (0..=((MOST - FEWEST) / APART) as usize)
         .map(|n| FEWEST + n as f64 * APART)
         .collect();
-    let gains = parallel::map(&numbers, |counts| {
-        let mut column = response(problem, *counts);
+    let projected = |moved: &(dyn Fn(f64) -> f64 + Sync)| {
+        let mut column = response(problem, moved);
         for (value, left) in column.iter_mut().zip(residual) {
             // where nothing counts
             if *left == 0.0 {
@@ -39,7 +39,29 @@ pub(crate) fn likely(problem: &Problem, basis: &Basis, residual: &[f64], count: 
             }
         }
         basis.project(&mut column);
-        let (along, length) = (dot(&column, residual), dot(&column, &column));
+        column
+    };
+    let levels = levels(problem);
+    let parts = (levels.len() <= FEW_LEVELS).then(|| {
+        // the circuit is linear: what a rounding does is the sum of what it does at each level of the duty
+        let columns = parallel::map(&levels, |level| projected(&|duty| f64::from(u8::from(duty == *level))));
+        let products = (columns.iter()).map(|a| columns.iter().map(|b| dot(a, b)).collect::<Vec<f64>>());
+        let along: Vec<f64> = columns.iter().map(|column| dot(column, residual)).collect();
+        (along, products.collect::<Vec<_>>())
+    });
+    let gains = parallel::map(&numbers, |counts| {
+        let moved = |duty: f64| rounded(duty, *counts) - duty;
+        let (along, length) = match &parts {
+            Some((along, products)) => {
+                let by: Vec<f64> = levels.iter().map(|level| moved(*level)).collect();
+                let square = products.iter().zip(&by).map(|(row, by_row)| by_row * dot(row, &by));
+                (dot(along, &by), square.sum())
+            }
+            None => {
+                let column = projected(&moved);
+                (dot(&column, residual), dot(&column, &column))
+            }
+        };
         // a count that rounds no duty has no response at all
         let share = (along / length.max(1e-300)).clamp(LEAST_SHARE, MOST_SHARE);
         // by how much chi-square falls if that share of the response is taken away
@@ -61,6 +83,24 @@ pub(crate) fn likely(problem: &Problem, basis: &Basis, residual: &[f64], count: 
         }
     }
     found
+}
+
+/// Records with more levels of the duty than these are followed for each number of counts: beyond it, the products of their responses cost
+/// as much.
+const FEW_LEVELS: usize = 64;
+
+/// The duties of all records, each once.
+fn levels(problem: &Problem) -> Vec<f64> {
+    let records = problem.records.iter().filter(|record| !record.settled);
+    let mut duties: Vec<f64> = records.flat_map(|record| record.duty.iter().copied()).collect();
+    duties.sort_by(f64::total_cmp);
+    duties.dedup();
+    duties
+}
+
+/// A duty as a counter rounds it.
+fn rounded(duty: f64, counts: f64) -> f64 {
+    (libm::floor(duty * counts + 0.5) / counts).min(1.0)
 }
 
 /// Stretches of numbers that round every duty to the same count: what they make of a record changes smoothly within.
@@ -85,8 +125,8 @@ fn pieces(problem: &Problem, numbers: &[f64]) -> Vec<Range<usize>> {
     list
 }
 
-/// Change of the signals over their noise when the duty is rounded to `counts` per period.
-fn response(problem: &Problem, counts: f64) -> Vec<f64> {
+/// Change of the signals over their noise when each duty is `moved` by so much.
+fn response(problem: &Problem, moved: &(dyn Fn(f64) -> f64 + Sync)) -> Vec<f64> {
     let mut out = vec![0.0; problem.len()];
     for (record, offset) in problem.records.iter().zip(&problem.offsets).filter(|(r, _)| !r.settled) {
         for segment in &record.segments {
@@ -97,7 +137,7 @@ fn response(problem: &Problem, counts: f64) -> Vec<f64> {
                 let next = (row + 1).min(record.rows() - 1);
                 // sampled inside a PWM period, the way to the next sample belongs to two of them
                 for (row, share) in [(row, 1.0 - record.phase), (next, record.phase)] {
-                    (v, i) = advanced(problem, record, row, counts, share, (v, i));
+                    (v, i) = advanced(problem, record, row, moved(record.duty[row]), share, (v, i));
                 }
             }
         }
@@ -113,14 +153,13 @@ fn advanced(
     problem: &Problem,
     record: &Record,
     row: usize,
-    counts: f64,
+    moved: f64,
     share: f64,
     (mut v, mut i): (f64, f64),
 ) -> (f64, f64) {
     let p = &problem.base.plant;
     let duty = record.duty[row];
-    let rounded = (libm::floor(duty * counts + 0.5) / counts).min(1.0);
-    let (topology, moved) = (p.converter.topology, rounded - duty);
+    let topology = p.converter.topology;
     let v_in = p.converter.v_in * record.v_in_ratio;
     let pushed = topology.span(v_in, problem.bases.v) * moved;
     // what the output receives of the inductor's current, and how much less of it while the duty is longer
@@ -141,4 +180,47 @@ fn advanced(
         v += h / p.converter.capacitance * (give * i - kept - g * v);
     }
     (v, i)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+    use std::path::Path;
+
+    use measured::{ColumnMap, Sheet};
+    use plant::Parameters;
+
+    use super::{levels, response, rounded};
+    use crate::drive::Model;
+    use crate::problem::Problem;
+    use crate::record::Record;
+
+    #[test]
+    fn a_rounding_is_the_sum_of_what_it_does_at_each_level() {
+        let model = Parameters::paper_table();
+        let mut text = "t,d,v_o,i_load\n".to_owned();
+        for n in 0..80 {
+            let duty = [0.5, 0.437, 0.561][n / 30];
+            let _ = writeln!(
+                text,
+                "{:.5},{duty},{:.2},5",
+                n as f64 * 1e-4,
+                200.0 * duty + 0.1 * (n % 3) as f64
+            );
+        }
+        let sheet = Sheet::parse(Path::new("run.csv"), text.into(), &Record::file_options()).unwrap();
+        let record = Record::read(&sheet, &ColumnMap::default(), &model).unwrap();
+        let problem = Problem::new(vec![record], Model::new(&model));
+        let levels = levels(&problem);
+        assert_eq!(levels, [0.437, 0.5, 0.561]);
+        let whole = response(&problem, &|duty| rounded(duty, 33.3) - duty);
+        let mut sum = vec![0.0; whole.len()];
+        for level in levels {
+            let unit = response(&problem, &|duty| f64::from(u8::from(duty == level)));
+            let by = rounded(level, 33.3) - level;
+            sum.iter_mut().zip(unit).for_each(|(sum, unit)| *sum += by * unit);
+        }
+        let most = whole.iter().fold(0.0f64, |most, value| most.max(value.abs()));
+        assert!(most > 0.01 && whole.iter().zip(&sum).all(|(a, b)| (a - b).abs() < 1e-9 * most));
+    }
 }

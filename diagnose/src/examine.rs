@@ -1,6 +1,6 @@
 //! Training records to an answer, before any record judges it.
 
-use crate::attribute::{Attribution, attribute};
+use crate::attribute::{Attribution, attribute, without_search};
 use crate::doubts::{self, Doubt};
 use crate::drive::Model;
 use crate::fast;
@@ -9,7 +9,7 @@ use crate::fit::State;
 use crate::gain::{self, Pair};
 use crate::instants;
 use crate::noise::{self, Outlier};
-use crate::preflight;
+use crate::preflight::{self, Misread};
 use crate::problem::Problem;
 use crate::profile::{Profile, parabolas, profiles};
 use crate::progress::{Listener, Progress};
@@ -55,7 +55,11 @@ pub struct Examined {
 pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined {
     say(Progress::Stage("noise and initial states"));
     let (mut problem, mut null, mut outliers) = prepared(train.clone(), base);
-    let mut odd = preflight::readings(&problem, &null);
+    let misread = preflight::readings(&problem, &null);
+    let mut odd: Vec<String> = misread.iter().map(|one| one.words.clone()).collect();
+    if let Some(fault) = preflight::answer(&problem, &misread) {
+        return Examined::misread(problem, null, outliers, fault);
+    }
     let mut read_off = Vec::new();
     match timing::of(&problem, &null) {
         Some(Timing::Other(cause, carrier, said)) => {
@@ -80,7 +84,11 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
     // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
     let named = named(&attribution, &profiles);
-    let doubts = doubts::of(&problem, &attribution, &profiles, &structure);
+    let mut doubts = doubts::of(&problem, &attribution, &profiles, &structure);
+    if !structure.is_empty() || doubts::forbids(&named, &doubts) {
+        // where no cause explains the records the other reading is what there is to say
+        doubts.extend(odd_readings(&misread));
+    }
     read_off.extend(quantised::cause(&problem));
     let holds = structure.is_empty() && !doubts::forbids(&named, &doubts);
     Examined {
@@ -99,7 +107,37 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
     }
 }
 
+/// Other readings as doubts.
+fn odd_readings(misread: &[Misread]) -> impl Iterator<Item = Doubt> + '_ {
+    misread.iter().map(|one| Doubt::Bench(one.words.clone()))
+}
+
 impl Examined {
+    /// Records of which a fault of the bench is all that is wrong: no cause is sought.
+    fn misread(problem: Problem, null: State, outliers: Vec<Outlier>, fault: String) -> Self {
+        let (problem, attribution) = without_search(problem, null);
+        Examined {
+            structure: structures(&problem, &attribution.null, &attribution.null, attribution.inflation),
+            doubts: vec![Doubt::Bench(fault)],
+            verdict: Verdict::Unexplained,
+            problem,
+            attribution,
+            profiles: Vec::new(),
+            nothing: Vec::new(),
+            named: Vec::new(),
+            read_off: Vec::new(),
+            lines: Vec::new(),
+            outliers,
+            odd: Vec::new(),
+        }
+    }
+
+    /// Whether a fault of the bench is the answer, which no search behind it can better.
+    #[must_use]
+    pub fn is_misread(&self) -> bool {
+        self.attribution.best.is_none() && self.doubts.iter().any(|doubt| matches!(doubt, Doubt::Bench(_)))
+    }
+
     /// The verdict with lines that no cause makes: beside causes they are left, and without causes they are all that there is.
     #[must_use]
     pub fn verdict_with_lines(&self) -> Verdict {

@@ -51,16 +51,25 @@ pub struct Peak {
     pub ratio: f64,
 }
 
-/// Lines in each channel of the records that have a row each period.
+/// Periods from row to row, if all rows that count stand so far apart; nothing if they do not, or the record has no rows in time.
+fn apart(values: &[f64]) -> Option<(usize, usize)> {
+    let rows: Vec<usize> = (0..values.len()).filter(|row| values[*row] != 0.0).collect();
+    let first = *rows.first()?;
+    let step = rows.windows(2).map(|pair| pair[1] - pair[0]).min()?;
+    rows.iter()
+        .all(|row| (row - first) % step == 0)
+        .then_some((first, step))
+}
+
+/// Lines in each channel of the records over time.
 #[must_use]
 pub fn structures(problem: &Problem, null: &State, state: &State) -> Vec<Structure> {
     let mut found = Vec::new();
     let p = &problem.base.plant.converter;
     // what the filter rings at is no line, however fast it is
     let ring = problem.bases.t_sw / (TAU * (p.inductance * p.capacitance).sqrt());
-    let lowest = LOWEST.max(ABOVE_RING * ring);
     for (index, record) in problem.records.iter().enumerate() {
-        if record.settled || !record.dense || record.capture.is_some() {
+        if record.settled || record.capture.is_some() {
             continue;
         }
         for n in 0..CHANNELS {
@@ -68,6 +77,21 @@ pub fn structures(problem: &Problem, null: &State, state: &State) -> Vec<Structu
                 channel(problem, &state.residual, index, n),
                 channel(problem, &null.residual, index, n),
             );
+            let (first, step) = match record.dense {
+                true => (0, 1),
+                // of a slower rate the rows in between are empty
+                false => match apart(&left) {
+                    Some(rows) => rows,
+                    None => continue,
+                },
+            };
+            let [left, before] =
+                [left, before].map(|all| all.into_iter().skip(first).step_by(step).collect::<Vec<f64>>());
+            let lowest = LOWEST.max(ABOVE_RING * ring * step as f64);
+            // what is as fast as the rows themselves is folded down to anywhere
+            if lowest >= 0.5 {
+                continue;
+            }
             // a coarse converter leaves patterns of its own
             if record.lattice[n] > 1.5 * problem.sigma[n] {
                 continue;
@@ -77,7 +101,7 @@ pub fn structures(problem: &Problem, null: &State, state: &State) -> Vec<Structu
                 continue;
             }
             let shown = noise::left(&left);
-            let rate = 1.0 / problem.bases.t_sw;
+            let rate = 1.0 / (problem.bases.t_sw * step as f64);
             let words: Vec<String> = (peaks.iter())
                 .map(|peak| words(peak, left.len(), rate, problem.sigma[n], CHANNEL_UNITS[n]))
                 .collect();

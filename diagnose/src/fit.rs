@@ -39,6 +39,11 @@ pub(crate) const QUICK: Effort = Effort {
     steps: 3,
     small_gain: 0.5,
 };
+/// To see whether a cause can come near: Gauss and Newton's steps bring a fit within some percent of its end, or lead nowhere.
+const FIRST: Effort = Effort {
+    steps: 4,
+    small_gain: 0.5,
+};
 /// To compare: a gain of 0.5 is far below what decides anything (16 to name, 9 to tie).
 pub const ROUGH: Effort = Effort {
     steps: 8,
@@ -234,6 +239,12 @@ impl Fitter<'_> {
         let there = Fitter { basis: &own, ..*self };
         let again = there.in_basis(causes, &fit.values, &settled, held);
         if again.state.chi2 < fit.state.chi2 { again } else { fit }
+    }
+
+    /// The first steps of a fit, without the second look of [`Fitter::holding`].
+    pub(crate) fn first_steps(&self, causes: &[usize], values: &[f64], from: &State) -> Fit {
+        let fitter = Fitter { effort: FIRST, ..*self };
+        fitter.in_basis(causes, values, from, None)
     }
 
     /// A fit with what initial states explain at the model as given.

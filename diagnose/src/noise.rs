@@ -81,8 +81,11 @@ fn most(problem: &Problem, n: usize, scale: f64) -> f64 {
         .records
         .iter()
         .filter(|r| r.measured[n].iter().any(|v| v.is_finite()));
+    let sensors = &problem.base.plant.sensors;
+    let stated = [&sensors.v_out, &sensors.i_l, &sensors.i_out, &sensors.v_in][n].noise;
     match records.all(|record| record.settled && !record.repeated) {
-        true => POOR_METER * scale,
+        // who states a larger noise has a poorer meter
+        true => (POOR_METER * scale).max(stated),
         false => f64::INFINITY,
     }
 }

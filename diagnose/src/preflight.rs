@@ -1,13 +1,18 @@
 //! Faults of a bench that are no causes of a model, seen before any fit: rows beside each other that are not of one period, two channels
-//! exchanged, records at another source, a held-out record that is a training record again.
+//! exchanged, a probe set to another ratio, the duty of the other switch, another kind of converter, records at another source, a held-out
+//! record that is a training record again.
 //!
 //! Each other way of reading a record is simulated once with the model as it is. A reading that leaves a small part of the error
-//! is named, and nobody is kept from the diagnosis: a delay on the list of causes may look like a shift.
+//! is named. Nobody is kept from the diagnosis where a cause may look like it, as a delay looks like a shift. What no cause of the list does,
+//! and what leaves noise alone in every record, needs no search: the fault is the answer.
+
+use plant::Topology;
 
 use crate::drive::Model;
 use crate::fit::State;
 use crate::ideal::{self, Ideal};
 use crate::median::median;
+use crate::noise;
 use crate::parallel;
 use crate::problem::{Problem, duty_accuracy};
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
@@ -24,6 +29,9 @@ const OTHER_SOURCE: f64 = 0.06;
 // a convention: below it a millivolt of the output is 20 of the source
 const LEAST_DUTY: f64 = 0.05;
 
+/// Ratios of probes and shunts that are set wrong. The list of causes ends at half and at one and a half.
+const PROBES: [f64; 4] = [2.0, 10.0, 0.5, 0.1];
+
 /// Another way to read a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Reading {
@@ -31,12 +39,31 @@ enum Reading {
     Shifted(isize),
     /// Two channels the other way round.
     Exchanged(usize, usize),
+    /// A channel shows so many times what there is.
+    Probe(usize, f64),
+    /// The duty is that of the other switch.
+    OtherSwitch,
+    /// The record is of another kind of converter.
+    Kind(Topology),
+}
+
+/// A record that is better read in another way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Misread {
+    /// What it looks like, and what mends it.
+    pub words: String,
+    reading: Reading,
+    /// Nothing but noise is left in this reading, and no cause of the list does the same.
+    is_sure: bool,
 }
 
 impl Reading {
     fn of(self, record: &Record) -> Record {
         let mut record = record.clone();
         match self {
+            Reading::Probe(n, times) => record.measured[n].iter_mut().for_each(|value| *value /= times),
+            Reading::OtherSwitch => record.duty.iter_mut().for_each(|duty| *duty = 1.0 - *duty),
+            Reading::Kind(_) => {}
             Reading::Shifted(by) => {
                 for values in &mut record.measured {
                     let old = std::mem::take(values);
@@ -65,45 +92,139 @@ impl Reading {
                 let [a, b] = [a, b].map(|n| CHANNEL_NAMES[n]);
                 format!("{name}: the columns {a} and {b} look exchanged; if so: --map {a}={b},{b}={a}")
             }
+            Reading::Probe(n, times) => {
+                let channel = CHANNEL_NAMES[n];
+                format!(
+                    "{name}: {channel} looks as if it showed {times} times what there is: a probe or shunt of another ratio? if so: {} times its \
+                     column, by a map",
+                    times.recip()
+                )
+            }
+            Reading::OtherSwitch => format!(
+                "{name}: the duty looks like that of the lower switch, 1 - d; if so, turn it by a map file: scale = -1.0, offset = 1.0 for the duty \
+                 under [columns]"
+            ),
+            Reading::Kind(kind) => format!(
+                "{name}: the record looks like that of a {0}, and the model is of another kind; if so: topology = \"{0}\" under [converter] of the \
+                 plant file",
+                kind.word()
+            ),
         }
+    }
+
+    /// Whether the list of causes has nothing that does the same to this record.
+    fn is_no_cause(self, record: &Record) -> bool {
+        match self {
+            Reading::Shifted(_) | Reading::Exchanged(..) => false,
+            Reading::Probe(..) | Reading::Kind(_) => true,
+            // a duty that stands still is another by 1 - 2 d, which a source voltage or an offset may be as well; one that moves goes the
+            // other way
+            Reading::OtherSwitch => {
+                let (low, high) =
+                    (record.duty.iter()).fold((1.0f64, 0.0f64), |(low, high), d| (low.min(*d), high.max(*d)));
+                high - low >= (1.0 - 2.0 * median(record.duty.iter().copied())).abs()
+            }
+        }
+    }
+
+    /// The model for this reading.
+    fn model(self, model: &Model) -> Model {
+        let mut model = model.clone();
+        if let Reading::Kind(kind) = self {
+            model.plant.converter.topology = kind;
+        }
+        model
     }
 }
 
 /// What the training records look like in another reading; `null` is the model as it is.
-pub fn readings(problem: &Problem, null: &State) -> Vec<String> {
+pub fn readings(problem: &Problem, null: &State) -> Vec<Misread> {
     let all: Vec<usize> = (0..problem.records.len())
-        .filter(|n| !problem.records[*n].settled)
+        .filter(|n| problem.records[*n].capture.is_none())
         .collect();
-    let best = parallel::map(&all, |index| best_reading(problem, &null.model, *index));
-    let named = best
+    parallel::map(&all, |index| best_reading(problem, null, *index))
         .into_iter()
-        .zip(&all)
-        .filter_map(|(reading, index)| Some(reading?.words(&problem.records[*index])));
-    named.collect()
+        .flatten()
+        .collect()
 }
 
-fn best_reading(problem: &Problem, model: &Model, index: usize) -> Option<Reading> {
+/// The fault that answers for all records: each is misread in the same way, and nothing but noise is left in that reading.
+pub fn answer(problem: &Problem, misread: &[Misread]) -> Option<String> {
+    let first = misread.first()?;
+    let same = |one: &Misread| one.is_sure && one.reading == first.reading;
+    (misread.len() == problem.records.len() && misread.iter().all(same)).then(|| first.words.clone())
+}
+
+fn best_reading(problem: &Problem, null: &State, index: usize) -> Option<Misread> {
     let record = &problem.records[index];
-    let mean_square = |record: Record| {
+    let mean_square = |reading: Option<Reading>| {
         let mut alone = problem.clone();
         (alone.offsets, alone.masked) = (vec![0], vec![problem.masked[index].clone()]);
-        alone.records = vec![record];
-        let state = State::settle(&alone, model, &alone.first_starts(), None);
+        alone.records = vec![reading.map_or_else(|| record.clone(), |reading| reading.of(record))];
+        if let Some(Reading::Probe(n, times)) = reading {
+            // the noise was seen through the same probe
+            alone.sigma[n] /= times;
+        }
+        let model = reading.map_or_else(|| null.model.clone(), |reading| reading.model(&null.model));
+        let state = State::settle(&alone, &model, &alone.first_starts(), None);
         state.chi2 / alone.count().max(1) as f64
     };
-    let as_it_is = mean_square(record.clone());
+    let as_it_is = mean_square(None);
     if as_it_is < WRONG {
         return None;
     }
+    let tried = tried(problem, null, index).into_iter();
+    let found = tried.map(|reading| (mean_square(Some(reading)), reading));
+    let (left, reading) = found.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (left < LEFT * as_it_is).then(|| Misread {
+        words: reading.words(record),
+        reading,
+        is_sure: left < WRONG && reading.is_no_cause(record),
+    })
+}
+
+/// Readings of a record that are worth a simulation.
+fn tried(problem: &Problem, null: &State, index: usize) -> Vec<Reading> {
+    let record = &problem.records[index];
     let has = |n: usize| record.measured[n].iter().any(|v| v.is_finite());
     let shifts = (-FARTHEST..=FARTHEST).filter(|by| *by != 0).map(Reading::Shifted);
     let pairs = [(1, 2), (0, 3)].into_iter().filter(|(a, b)| has(*a) && has(*b));
-    let tried: Vec<Reading> = shifts.chain(pairs.map(|(a, b)| Reading::Exchanged(a, b))).collect();
-    let found = tried
-        .into_iter()
-        .map(|reading| (mean_square(reading.of(record)), reading));
-    let (left, reading) = found.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (left < LEFT * as_it_is).then_some(reading)
+    let in_time = shifts.chain(pairs.map(|(a, b)| Reading::Exchanged(a, b)));
+    // points of a table have no neighbours in time
+    let mut list: Vec<Reading> = in_time.filter(|_| !record.settled).collect();
+    for n in (0..CHANNELS).filter(|n| has(*n)) {
+        list.extend(
+            (PROBES.into_iter())
+                .map(|times| Reading::Probe(n, times))
+                .filter(|reading| match reading {
+                    Reading::Probe(n, times) => is_nearer(problem, null, index, (*n, *times)),
+                    _ => false,
+                }),
+        );
+    }
+    list.push(Reading::OtherSwitch);
+    let own = null.model.plant.converter.topology;
+    let kinds = [Topology::Buck, Topology::Boost, Topology::BuckBoost];
+    list.extend(kinds.into_iter().filter(|kind| *kind != own).map(Reading::Kind));
+    list
+}
+
+/// Whether a channel lies nearer to what the model shows if its probe has this ratio: initial states that follow a wrong probe for some rows
+/// leave that as it is.
+fn is_nearer(problem: &Problem, null: &State, index: usize, (n, times): (usize, f64)) -> bool {
+    let left = noise::channel(problem, &null.residual, index, n);
+    let rows = left.iter().zip(&problem.records[index].measured[n]);
+    let errors = rows
+        .filter(|(left, value)| **left != 0.0 && value.is_finite())
+        .map(|(left, value)| {
+            let shown = value / problem.sigma[n];
+            (
+                left * left,
+                ((shown - times * (shown - left)) * (shown - times * (shown - left))),
+            )
+        });
+    let (own, other) = errors.fold((0.0, 0.0), |(a, b), (own, other)| (a + own, b + other));
+    other < own
 }
 
 /// Source voltage that a record's voltages and duties show, without the losses that all records share; nothing if the current may rest.

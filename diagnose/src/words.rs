@@ -21,6 +21,12 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>) -> St
         ),
     };
     match found.verdict {
+        Verdict::Unexplained if found.is_misread() => {
+            let faults = doubts::said(&found.doubts).join("; ");
+            format!(
+                "The records are not read as they were made: {faults}. Read so, the model explains them within their noise; no cause was sought."
+            )
+        }
         Verdict::Unexplained => {
             let all: Vec<Structure> = found.structure.iter().chain(&found.lines).cloned().collect();
             let left = match all.is_empty() {

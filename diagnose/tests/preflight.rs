@@ -60,7 +60,7 @@ fn said(table: &Table) -> String {
     problem.sigma = noise::sigma(&problem, &null.residual);
     let null = State::settle(&problem, &base, &null.starts, None);
     let mut all = vec![repairs];
-    all.extend(preflight::readings(&problem, &null));
+    all.extend(preflight::readings(&problem, &null).into_iter().map(|one| one.words));
     all.join("\n")
 }
 

@@ -1,7 +1,10 @@
 //! The search for a set of causes: forward with several leaders, exchange, backward, and what would do as well.
 
+mod singles;
 mod starts;
 mod weigh;
+
+pub(crate) use starts::Known;
 
 use crate::causes::Search;
 use crate::fit::{FINE, Fit, Fitter, State};
@@ -47,6 +50,8 @@ pub(crate) struct Searcher<'a> {
     pub fitter: Fitter<'a>,
     /// Hears how far it is.
     pub say: Listener<'a>,
+    /// What its looks share.
+    pub known: Known,
 }
 
 /// A fitted set, and the sensitivities of its parameters where it ends.
@@ -100,27 +105,6 @@ impl Searcher<'_> {
         names.join(" + ")
     }
 
-    /// Every candidate alone. Those that explain next to nothing at first order are not followed further.
-    pub fn singles(&self, stage: &str) -> Vec<Fit> {
-        let null = self.fitter.null;
-        let all: Vec<usize> = (0..self.fitter.candidates.len()).collect();
-        let first_order = parallel::map(&all, |cause| match self.search(*cause) {
-            Search::OwnOr(_) => {
-                let best = self.begins(&Set::NONE, *cause, null).into_iter().next();
-                best.map_or(0.0, |(expected, _)| null.chi2 - expected)
-            }
-            _ => gained(&self.fitter.sensitivity(*cause, null), &null.residual),
-        });
-        let most = first_order.iter().copied().fold(0.0, f64::max);
-        progress::map(self.say, stage, &all, |cause| {
-            let follow = first_order[*cause] > (FOLLOWED * most).max(LEAST_FOLLOWED);
-            if self.begins_at_own(*cause) && !follow {
-                return self.fitter.unmoved(*cause, first_order[*cause]);
-            }
-            self.added(&Set::NONE, *cause, null)
-        })
-    }
-
     /// Chi-square with a price for each parameter.
     pub fn score(&self, fit: &Fit) -> f64 {
         let price = libm::log(self.fitter.problem.count() as f64);
@@ -166,7 +150,11 @@ impl Searcher<'_> {
             return (None, Vec::new());
         };
         let mut best = self.polished(first);
-        while best.causes.len() < MOST && best.values.len() < most && !self.is_hopeless(&best) {
+        while best.causes.len() < MOST
+            && best.values.len() < most
+            && !self.is_hopeless(&best)
+            && !self.is_out_of_reach(&best)
+        {
             let stage = format!("more than {}", self.names(&best));
             let mut larger = self.forward(&best, LOOKED_AT, &stage);
             // two causes that resemble each other are best found from the one that explains less alone

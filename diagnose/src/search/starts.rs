@@ -1,5 +1,8 @@
 //! Where the fit of a candidate begins: what the residual itself says of a line or a counter, or the starts of its entry.
 
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+
 use super::{Searcher, Set, TIE, gained};
 use crate::causes::Search;
 use crate::duty_steps;
@@ -14,6 +17,29 @@ const COUNTS: usize = 8;
 /// First step of the refinement, counts: twice the distance of the numbers that are looked at, so that both neighbours are reached.
 const COUNT_STEP: f64 = 0.2;
 
+/// A candidate and the place of one of its starts.
+type Start = (usize, usize);
+
+/// Tangents at starts that stand in the list of causes.
+#[derive(Debug, Default)]
+pub(crate) struct Known(Mutex<HashMap<Start, Arc<Vec<Vec<f64>>>>>);
+
+impl Known {
+    fn get(&self, start: &Start) -> Option<Arc<Vec<Vec<f64>>>> {
+        // poisoned only by a panic, which goes on elsewhere
+        self.0.lock().ok()?.get(start).cloned()
+    }
+
+    /// The same whichever thread comes first.
+    fn keep(&self, start: Start, tangents: Vec<Vec<f64>>) -> Arc<Vec<Vec<f64>>> {
+        let tangents = Arc::new(tangents);
+        if let Ok(mut known) = self.0.lock() {
+            known.insert(start, Arc::clone(&tangents));
+        }
+        tangents
+    }
+}
+
 impl Searcher<'_> {
     /// Starts of `cause`, and the chi-square that `set` with it would have from each at first order, best first.
     pub(super) fn begins(&self, set: &Set<'_>, cause: usize, from: &State) -> Vec<(f64, Vec<f64>)> {
@@ -23,13 +49,13 @@ impl Searcher<'_> {
             let own = self.fitter.candidates[cause].own.clone();
             return vec![(from.chi2 - gained(&columns, &from.residual), own)];
         }
-        let looks = self.starts(cause, from).into_iter().map(|start| {
+        let looks = self.starts(cause, from).into_iter().enumerate().map(|(place, start)| {
             let state = self.fitter.state_at(&[cause], &start, from, 0).0;
             // the initial states and the others may have to follow before it shows what it is worth
             let mut left = state.residual.clone();
             self.fitter.basis.project(&mut left);
             let mut columns = set.columns.to_vec();
-            columns.extend(self.fitter.sensitivity(cause, &state));
+            columns.extend(self.tangents(cause, place, &state).iter().cloned());
             (dot(&left, &left) - gained(&columns, &left), start)
         });
         let mut looks: Vec<_> = looks.collect();
@@ -38,6 +64,24 @@ impl Searcher<'_> {
             (Some((_, step)), Search::Counter) => vec![self.refined(set, cause, from, step[0].recip())],
             _ => looks,
         }
+    }
+
+    /// Tangents of a candidate at the `place`th of its starts, near `state`. Those of starts that stand in the list of causes are taken beside
+    /// the model as given, once for all looks of a search: other causes move them by little, and they only say where a fit begins. Cables
+    /// and input capacitors, integrated in short steps, would take most of the time of a search.
+    pub(super) fn tangents(&self, cause: usize, place: usize, state: &State) -> Arc<Vec<Vec<f64>>> {
+        let listed = match self.search(cause) {
+            Search::From(_) | Search::OwnOr(_) => self.fitter.starts(cause).into_iter().nth(place),
+            _ => None,
+        };
+        let Some(start) = listed else {
+            return Arc::new(self.fitter.sensitivity(cause, state));
+        };
+        let known = self.known.get(&(cause, place));
+        known.unwrap_or_else(|| {
+            let there = self.fitter.state_at(&[cause], &start, self.fitter.null, 0).0;
+            self.known.keep((cause, place), self.fitter.sensitivity(cause, &there))
+        })
     }
 
     /// A duty counter near `counts` that fits better, and the chi-square expected with it.
@@ -66,7 +110,7 @@ impl Searcher<'_> {
     }
 
     /// Where the fit of a candidate may begin; what the residual itself tells is read off it.
-    fn starts(&self, cause: usize, from: &State) -> Vec<Vec<f64>> {
+    pub(super) fn starts(&self, cause: usize, from: &State) -> Vec<Vec<f64>> {
         let (problem, residual) = (self.fitter.problem, &from.residual);
         match self.search(cause) {
             Search::Line => {

@@ -1,15 +1,25 @@
 //! Whether a fit is worth what it has more than another.
 
 use super::{Searcher, Set};
+use crate::causes::Search;
 use crate::fit::{Fit, State};
 use crate::level::{ACCURACY, threshold};
 use crate::parallel;
+use crate::problem::{axpy, dot};
 use crate::shape::structures;
 
 /// A search ends with two causes where they leave this mean square over that of the noise, and this share of what there was: a third of
 /// the error. Where two causes are hidden the best two leave next to nothing; three are never hidden. Conventions.
 const HOPELESS: f64 = 10.0;
 const STILL_THERE: f64 = 0.1;
+
+/// A search ends where all candidates together, as many as there are, leave this share of the squares at first order, and this mean square
+/// over that of the noise: two more causes do not what forty cannot. A cause whose response bends leaves less than half of it in its
+/// tangents at the starts.
+const OUT_OF_REACH: f64 = 0.5;
+const WELL_ABOVE: f64 = 4.0;
+/// Of a direction at most this share of the length may be in those before it, or it is rounding.
+const NEW: f64 = 1e-5;
 
 impl Searcher<'_> {
     /// Whether a fit says what the edges of the gate do, where without it they would do more than edges can: the trim that stands beside
@@ -66,9 +76,79 @@ impl Searcher<'_> {
             && fit.state.chi2 > STILL_THERE * self.fitter.null.chi2
     }
 
+    /// Whether all candidates together explain too little of what a fit leaves for any few of them to explain it.
+    pub(super) fn is_out_of_reach(&self, fit: &Fit) -> bool {
+        let count = self.fitter.problem.count().max(1) as f64;
+        if fit.state.chi2 < WELL_ABOVE * count || self.structure(fit) == 0.0 {
+            return false;
+        }
+        let all: Vec<usize> = (0..self.fitter.candidates.len()).collect();
+        let directions = parallel::map(&all, |cause| self.directions(*cause, &fit.state));
+        let mut left = fit.state.residual.clone();
+        self.fitter.basis.project(&mut left);
+        let before = dot(&left, &left);
+        let after = without(&mut left, directions.into_iter().flatten());
+        after > WELL_ABOVE * count && after > OUT_OF_REACH * before
+    }
+
+    /// Where a candidate can move the signals at first order: along its tangents, and to where its fit may begin and along those there.
+    fn directions(&self, cause: usize, from: &State) -> Vec<Vec<f64>> {
+        if self.search(cause) == Search::Own {
+            return self.fitter.sensitivity(cause, from);
+        }
+        let each = self
+            .starts(cause, from)
+            .into_iter()
+            .enumerate()
+            .flat_map(|(place, start)| {
+                let there = self.fitter.state_at(&[cause], &start, from, 0).0;
+                let mut way = from.residual.clone();
+                axpy(&mut way, -1.0, &there.residual);
+                self.fitter.basis.project(&mut way);
+                let mut list = self.tangents(cause, place, &there).to_vec();
+                list.push(way);
+                list
+            });
+        each.collect()
+    }
+
     /// Whether a cause beside others is so small that the difference of two simulators may look like it.
     pub(super) fn is_tiny(&self, fit: &Fit, member: usize) -> bool {
         let cause = fit.causes[member];
         self.fitter.candidates[cause].is_nothing(&self.values_of(fit, &[cause]))
+    }
+}
+
+/// Takes out of `left` all that lies along `directions`; the squares that are left.
+fn without(left: &mut [f64], directions: impl Iterator<Item = Vec<f64>>) -> f64 {
+    let mut known: Vec<Vec<f64>> = Vec::new();
+    for mut one in directions {
+        let whole = dot(&one, &one).sqrt();
+        for other in &known {
+            let share = dot(other, &one);
+            axpy(&mut one, -share, other);
+        }
+        let length = dot(&one, &one).sqrt();
+        if !length.is_finite() || length <= NEW * whole {
+            continue;
+        }
+        one.iter_mut().for_each(|value| *value /= length);
+        let share = dot(&one, left);
+        axpy(left, -share, &one);
+        known.push(one);
+    }
+    dot(left, left)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without;
+
+    #[test]
+    fn what_lies_in_a_span_is_taken_out_once() {
+        let mut left = vec![1.0, 2.0, 3.0];
+        let span = vec![vec![1.0, 0.0, 0.0], vec![2.0, 0.0, 0.0], vec![1.0, 1.0, 0.0]];
+        assert!((without(&mut left, span.into_iter()) - 9.0).abs() < 1e-12);
+        assert!(left[0].abs() < 1e-12 && left[1].abs() < 1e-12);
     }
 }

@@ -1,0 +1,72 @@
+//! Every candidate alone: a look at first order, the first steps of a fit, and the end of those that lead or come near.
+
+use super::{BEGUN, FOLLOWED, LEAST_FOLLOWED, NEAR, Searcher, Set, TIE_SHARE, gained};
+use crate::causes::Search;
+use crate::fit::Fit;
+use crate::parallel;
+use crate::progress;
+
+/// Single causes whose fit is brought to its end after its first steps, whatever they leave: twice the leaders that anything asks for.
+/// What is behind them leads nothing. A convention.
+const BROUGHT_TO_AN_END: usize = 10;
+/// Mean square over that of the noise from which on the best single cause leaves structure for sure, in `shape` from 2.5 on.
+const STILL_FAR: f64 = 4.0;
+
+impl Searcher<'_> {
+    /// Every candidate alone. Those that explain next to nothing at first order are not followed further.
+    pub fn singles(&self, stage: &str) -> Vec<Fit> {
+        let null = self.fitter.null;
+        let all: Vec<usize> = (0..self.fitter.candidates.len()).collect();
+        let first_order = parallel::map(&all, |cause| match self.search(*cause) {
+            Search::OwnOr(_) => {
+                let best = self.begins(&Set::NONE, *cause, null).into_iter().next();
+                best.map_or(0.0, |(expected, _)| null.chi2 - expected)
+            }
+            _ => gained(&self.fitter.sensitivity(*cause, null), &null.residual),
+        });
+        let most = first_order.iter().copied().fold(0.0, f64::max);
+        let is_followed =
+            |cause: usize| !self.begins_at_own(cause) || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED);
+        let looked = progress::map(self.say, stage, &all, |cause| match is_followed(*cause) {
+            true => self.looked_at(*cause),
+            false => self.fitter.unmoved(*cause, first_order[*cause]),
+        });
+        let near = self.near_the_best(&looked);
+        progress::map(self.say, &format!("{stage}, those that come near"), &all, |cause| {
+            let fit = &looked[*cause];
+            if !is_followed(*cause) || !near.contains(cause) {
+                return fit.clone();
+            }
+            let further = self.fitter.from(&fit.causes, &fit.values, &fit.state);
+            if further.state.chi2 < fit.state.chi2 {
+                further
+            } else {
+                fit.clone()
+            }
+        })
+    }
+
+    /// A candidate alone after the first steps of its fit, which show whether it can come near.
+    fn looked_at(&self, cause: usize) -> Fit {
+        let null = self.fitter.null;
+        let begins = self.begins(&Set::NONE, cause, null).into_iter().take(BEGUN);
+        let fits = begins.map(|(_, start)| self.fitter.first_steps(&[cause], &start, null));
+        let best = fits.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+        best.unwrap_or_else(|| self.fitter.unmoved(cause, 0.0))
+    }
+
+    /// Places of those that lead, and of those that may fit as well as the first in the end.
+    fn near_the_best(&self, looked: &[Fit]) -> Vec<usize> {
+        let mut places = self.leaders(looked, BROUGHT_TO_AN_END);
+        let least = looked.iter().map(|fit| fit.state.chi2).fold(f64::INFINITY, f64::min);
+        let explained = self.fitter.null.chi2 - least;
+        // what leaves structure has no rivals
+        if least > STILL_FAR * self.fitter.problem.count() as f64 {
+            return places;
+        }
+        // as far as a rival may be off, and as much again as the best leaves for what the first steps have not reached
+        let farthest = least + least.max(NEAR * TIE_SHARE * explained);
+        places.extend((0..looked.len()).filter(|place| looked[*place].state.chi2 < farthest));
+        places
+    }
+}

@@ -284,16 +284,16 @@ impl Writer<'_> {
     }
 
     /// Sums and hinges need no relations between values; a rational function of one value in numerator and denominator does.
-    fn sums_precisions(&self) -> &'static [u8] {
+    pub fn sums_precisions(&self) -> &'static [u8] {
         let hinges = self
             .policy
             .layers
             .iter()
             .all(|layer| matches!(layer.activation.shape(), Shape::Hinge { .. }));
         match (self.is_integer(), hinges) {
-            (true, _) => COARSE_FIRST,
+            (true, true) => COARSE_FIRST,
             (false, true) => COARSE,
-            (false, false) => FINE,
+            (_, false) => FINE,
         }
     }
 }

@@ -183,7 +183,11 @@ impl Writer<'_> {
             runs: BITS_AND_FINITE,
             assumed: if self.is_integer() { &[] } else { &["q_values"] },
             merged: self.curves(),
-            precisions: COARSE_FIRST,
+            precisions: if self.is_integer() {
+                self.sums_precisions()
+            } else {
+                COARSE_FIRST
+            },
         }
     }
 
@@ -246,7 +250,11 @@ impl Writer<'_> {
             runs: if self.takes_output_as_it_is() { BOTH } else { STEP },
             assumed: if self.policy.mapping.is_some() { VOUCHED } else { ACTION },
             merged: Vec::new(),
-            precisions: COARSE_FIRST,
+            precisions: match self.answer() {
+                // the law multiplies what the state holds
+                Answer::Gains(_) => FINE,
+                Answer::Index | Answer::Output => COARSE_FIRST,
+            },
         }
     }
 

@@ -63,24 +63,22 @@ pub enum Reading {
 pub fn goals(policy: &Policy, sources: &Sources<'_>) -> Result<Vec<Goal>, Refusal> {
     let terms = Terms::default();
     let spec = Spec::new(policy, &terms);
-    let mut all = facts::goals(spec);
+    // all texts are read before a goal is written: what is refused costs little
+    let mut readers: Vec<Box<dyn Emitted + '_>> = Vec::new();
     if let Some((header, source)) = sources.c {
-        for reading in sources.readings {
+        for &reading in sources.readings {
             let files = ((header.name, header.text), (source.name, source.text));
-            let unit = c::Unit::read(files.0, files.1, &c::defined(*reading, policy))?;
-            all.extend(of(
-                spec,
-                &c::C {
-                    spec,
-                    unit,
-                    reading: *reading,
-                },
-            )?);
+            let unit = c::Unit::read(files.0, files.1, &c::defined(reading, policy))?;
+            readers.push(Box::new(c::C { spec, unit, reading }));
         }
     }
     if let Some(source) = sources.rust {
         let unit = rust::Unit::read(source.name, source.text)?;
-        all.extend(of(spec, &rust::Rust { spec, unit })?);
+        readers.push(Box::new(rust::Rust { spec, unit }));
+    }
+    let mut all = facts::goals(spec);
+    for emitted in &readers {
+        all.extend(of(spec, emitted.as_ref())?);
     }
     Ok(all)
 }

@@ -1,7 +1,8 @@
 //! Goals as text of SMT-LIB 2.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write;
+use std::fmt::{self, Write};
 
 use crate::term::{Comparison, Node, Op, Sort, Term, Terms};
 
@@ -19,24 +20,39 @@ pub(crate) struct Script {
     pub text: String,
     /// Inputs that the goal depends on, with their widths.
     pub inputs: Vec<(String, u32)>,
-    names: BTreeMap<Term, String>,
+    names: Names,
+}
+
+/// Names of the inputs and the constants as they are written; all other terms have a number.
+#[derive(Default)]
+struct Names(BTreeMap<Term, String>);
+
+impl Names {
+    fn write(&self, term: Term, text: &mut String) {
+        let _ = match self.0.get(&term) {
+            Some(name) => text.write_str(name),
+            None => write!(text, "t{}", term.number()),
+        };
+    }
 }
 
 impl Script {
     /// The term as it stands in the script.
     pub(crate) fn name(&self, term: Term) -> String {
-        self.names.get(&term).cloned().unwrap_or_default()
+        let mut name = String::new();
+        self.names.write(term, &mut name);
+        name
     }
 }
 
 /// A script that is unsatisfiable exactly if `claim` follows from `given`. `shown` are defined in it too, for the model.
 pub(crate) fn script(terms: &Terms, given: &[Term], claim: Term, shown: &[Term], arithmetic: Arithmetic) -> Script {
-    let mut order = BTreeSet::new();
+    let mut needed = vec![false; terms.count()];
     let roots = given.iter().chain([&claim]).chain(shown);
     let mut open: Vec<Term> = roots.copied().collect();
     while let Some(term) = open.pop() {
-        if order.insert(term) {
-            open.extend(terms.node(term).args);
+        if !std::mem::replace(&mut needed[term.number() as usize], true) {
+            open.extend(&terms.node(term).args);
         }
     }
     let logic = match arithmetic {
@@ -46,12 +62,13 @@ pub(crate) fn script(terms: &Terms, given: &[Term], claim: Term, shown: &[Term],
     let mut script = Script {
         text: format!("(set-option :produce-models true)\n(set-logic {logic})\n"),
         inputs: Vec::new(),
-        names: BTreeMap::new(),
+        names: Names::default(),
     };
     definitions(&mut script.text);
     let mut declared = BTreeSet::new();
     // a term is made behind its parts, so the order of the store is one of definition
-    for term in order {
+    let order = (0..needed.len()).filter(|number| needed[*number]);
+    for term in order.map(|number| terms.at(number)) {
         let node = terms.node(term);
         define(terms, term, &node, arithmetic, &mut declared, &mut script);
     }
@@ -62,10 +79,13 @@ pub(crate) fn script(terms: &Terms, given: &[Term], claim: Term, shown: &[Term],
     script
 }
 
-fn sort(sort: Sort) -> String {
-    match sort {
-        Sort::Truth => "Bool".into(),
-        Sort::Bits(width) => format!("(_ BitVec {width})"),
+/// As SMT-LIB writes it.
+impl fmt::Display for Sort {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Sort::Truth => f.write_str("Bool"),
+            Sort::Bits(width) => write!(f, "(_ BitVec {width})"),
+        }
     }
 }
 
@@ -85,18 +105,16 @@ fn define(
     declared: &mut BTreeSet<&'static str>,
     script: &mut Script,
 ) {
-    let args: Vec<String> = node.args.iter().map(|arg| script.name(*arg)).collect();
-    let joined = args.join(" ");
     let width = node.args.first().map_or(0, |arg| terms.width(*arg));
-    let text = match &node.op {
+    let head: Cow<'static, str> = match &node.op {
         Op::Constant(value) => {
-            script.names.insert(term, constant(*value, node.sort));
+            script.names.0.insert(term, constant(*value, node.sort));
             return;
         }
         Op::Input(name) => {
-            let _ = writeln!(script.text, "(declare-const {name} {})", sort(node.sort));
+            let _ = writeln!(script.text, "(declare-const {name} {})", node.sort);
             script.inputs.push((name.clone(), terms.width(term)));
-            script.names.insert(term, name.clone());
+            script.names.0.insert(term, name.clone());
             return;
         }
         Op::Call(function) if arithmetic == Arithmetic::Ieee => {
@@ -104,30 +122,33 @@ fn define(
         }
         Op::Call(function) => {
             if declared.insert(function) {
-                let sorts: Vec<String> = node.args.iter().map(|arg| sort(terms.sort(*arg))).collect();
+                let sorts: Vec<String> = node.args.iter().map(|arg| terms.sort(*arg).to_string()).collect();
                 let _ = writeln!(
                     script.text,
                     "(declare-fun {function} ({}) {})",
                     sorts.join(" "),
-                    sort(node.sort)
+                    node.sort
                 );
             }
-            format!("({function} {joined})")
+            (*function).into()
         }
-        Op::Float(comparison) => format!("({}{width} {joined})", comparison_name(*comparison)),
-        Op::Not => format!("(not {joined})"),
-        Op::And => format!("(and {joined})"),
-        Op::Or => format!("(or {joined})"),
-        Op::Choose => format!("(ite {joined})"),
-        Op::Equal => format!("(= {joined})"),
-        Op::Bits(name) => format!("({name} {joined})"),
-        Op::Extract(high, low) => format!("((_ extract {high} {low}) {joined})"),
-        Op::ZeroExtend(by) => format!("((_ zero_extend {by}) {joined})"),
-        Op::SignExtend(by) => format!("((_ sign_extend {by}) {joined})"),
+        Op::Float(comparison) => Cow::Owned(format!("{}{width}", comparison_name(*comparison))),
+        Op::Not => "not".into(),
+        Op::And => "and".into(),
+        Op::Or => "or".into(),
+        Op::Choose => "ite".into(),
+        Op::Equal => "=".into(),
+        Op::Bits(name) => (*name).into(),
+        Op::Extract(high, low) => Cow::Owned(format!("(_ extract {high} {low})")),
+        Op::ZeroExtend(by) => Cow::Owned(format!("(_ zero_extend {by})")),
+        Op::SignExtend(by) => Cow::Owned(format!("(_ sign_extend {by})")),
     };
-    let name = format!("t{}", term.number());
-    let _ = writeln!(script.text, "(define-fun {name} () {} {text})", sort(node.sort));
-    script.names.insert(term, name);
+    let _ = write!(script.text, "(define-fun t{} () {} ({head}", term.number(), node.sort);
+    for arg in &node.args {
+        script.text.push(' ');
+        script.names.write(*arg, &mut script.text);
+    }
+    script.text.push_str("))\n");
 }
 
 fn comparison_name(comparison: Comparison) -> &'static str {
@@ -158,7 +179,6 @@ fn ieee(terms: &Terms, term: Term, function: &str, args: &[Term], script: &mut S
         number(&name),
         operands.join(" ")
     );
-    script.names.insert(term, name);
 }
 
 /// Bits as a number of IEEE 754.

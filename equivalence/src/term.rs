@@ -6,6 +6,7 @@
 
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::rc::Rc;
 
 /// A term of a [`Terms`]; without meaning in another one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -67,8 +68,8 @@ pub(crate) struct Node {
 
 #[derive(Debug, Default)]
 struct Store {
-    nodes: Vec<Node>,
-    index: HashMap<Node, Term>,
+    nodes: Vec<Rc<Node>>,
+    index: HashMap<Rc<Node>, Term>,
 }
 
 /// The store of all terms of a run: equal terms are one, which is what lets both sides of a goal meet.
@@ -92,21 +93,32 @@ fn signed(value: u64, width: u32) -> i64 {
 
 impl Terms {
     fn make(&self, op: Op, args: Vec<Term>, sort: Sort) -> Term {
-        let node = Node { op, args, sort };
+        let node = Rc::new(Node { op, args, sort });
         let mut store = self.store.borrow_mut();
         if let Some(term) = store.index.get(&node) {
             return *term;
         }
         // 2^32 terms would need a terabyte: memory ends first
         let term = Term(store.nodes.len() as u32);
-        store.nodes.push(node.clone());
+        store.nodes.push(Rc::clone(&node));
         store.index.insert(node, term);
         term
     }
 
     /// How `term` was made.
-    pub(crate) fn node(&self, term: Term) -> Node {
-        self.store.borrow().nodes[term.0 as usize].clone()
+    pub(crate) fn node(&self, term: Term) -> Rc<Node> {
+        Rc::clone(&self.store.borrow().nodes[term.0 as usize])
+    }
+
+    /// How many there are.
+    pub(crate) fn count(&self) -> usize {
+        self.store.borrow().nodes.len()
+    }
+
+    /// The term of that [`number`](Term::number).
+    pub(crate) fn at(&self, number: usize) -> Term {
+        // as in `make`
+        Term(number as u32)
     }
 
     pub(crate) fn sort(&self, term: Term) -> Sort {

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use random::SplitMix;
 
+use crate::clock::Clock;
 use crate::corpus::Corpus;
 use crate::finding::Finding;
 use crate::guard::{Fault, Reader, probe};
@@ -46,7 +47,7 @@ pub struct Summary {
     pub executions: u64,
     /// Those that the reader took.
     pub accepted: u64,
-    /// Time of all of it.
+    /// Time of a processor for all of it.
     pub seconds: f64,
     /// Kinds of answers.
     pub kinds: usize,
@@ -55,7 +56,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Inputs a second.
+    /// Inputs for each second of a processor.
     #[must_use]
     pub fn rate(&self) -> f64 {
         self.executions as f64 / self.seconds.max(1e-9)
@@ -74,16 +75,16 @@ pub fn run(target: &Target, plan: &Plan, journal: Option<&Journal>, say: &dyn Fn
     let mut known = BTreeSet::new();
     let mut summary = Summary::default();
     let mut input = Vec::new();
-    let started = Instant::now();
-    let mut said = started;
+    let clock = Clock::start();
+    let mut said = Instant::now();
     loop {
-        let elapsed = started.elapsed();
+        let elapsed = clock.passed();
         if is_over(&plan.until, summary.executions, elapsed) || known.len() >= MOST_FINDINGS {
             break;
         }
         if said.elapsed() > PROGRESS {
             said = Instant::now();
-            summary.seconds = elapsed.as_secs_f64();
+            summary.seconds = clock.worked().as_secs_f64();
             say(&progress(target.name, &summary, corpus.kinds()));
         }
         // the seeds as they are come first: what they answer is known before anything is changed
@@ -112,7 +113,7 @@ pub fn run(target: &Target, plan: &Plan, journal: Option<&Journal>, say: &dyn Fn
             }
         }
     }
-    summary.seconds = started.elapsed().as_secs_f64();
+    summary.seconds = clock.worked().as_secs_f64();
     summary.kinds = corpus.kinds();
     Ok(summary)
 }

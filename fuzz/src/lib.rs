@@ -14,6 +14,7 @@
 
 pub mod allocation;
 pub mod arguments;
+mod clock;
 pub mod corpus;
 pub mod driver;
 pub mod finding;

@@ -147,7 +147,7 @@ fn lost(target: &str, fault: &Fault, journal: &Path, seed: u64, folder: &Path) -
 }
 
 fn campaign(chosen: &[&'static Target], arguments: &Arguments) -> Result<bool, String> {
-    let journals = tempfile::tempdir().map_err(|error| format!("cannot make a folder: {error}"))?;
+    let journals = targets::folder().map_err(|error| format!("cannot make a folder: {error}"))?;
     let next = AtomicUsize::new(0);
     let done: Mutex<Vec<(usize, Result<Summary, String>)>> = Mutex::default();
     std::thread::scope(|scope| {
@@ -202,6 +202,8 @@ fn watched(target: &Target, arguments: &Arguments, journal: &Path) -> Result<Sum
         .arg(findings(arguments))
         .arg("--journal")
         .arg(journal);
+    // what a reader writes on its way goes with the journals, also if the process is killed
+    command.env("TMPDIR", journal.parent().unwrap_or(journal));
     let until = arguments.until();
     if let Some(executions) = until.executions {
         command.args(["--executions", &executions.to_string()]);

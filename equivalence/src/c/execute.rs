@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::syntax::{Expr, Function, Statement, Type, What};
+use super::syntax::{Expr, Statement, Type, What};
 use super::unit::Unit;
 use crate::float::Float;
 use crate::machine::{Binary, Kind, Machine, Place, Value, Wrong, number};
@@ -27,7 +27,6 @@ type Names = BTreeMap<String, (Place, Type)>;
 pub(crate) struct Walk<'a, 'u> {
     pub(super) unit: &'u Unit,
     pub machine: Machine<'a>,
-    functions: BTreeMap<String, Function>,
     pub(super) tables: BTreeMap<String, Place>,
     pub(super) outside: &'u mut dyn Outside,
     pub(super) names: Names,
@@ -40,7 +39,6 @@ impl<'a, 'u> Walk<'a, 'u> {
         Walk {
             unit,
             machine: Machine::new(float),
-            functions: BTreeMap::new(),
             tables: BTreeMap::new(),
             outside,
             names: BTreeMap::new(),
@@ -68,14 +66,10 @@ impl<'a, 'u> Walk<'a, 'u> {
     }
 
     pub(super) fn enter(&mut self, name: &str, arguments: Vec<Value>) -> Result<Option<Value>, Wrong> {
-        if !self.functions.contains_key(name) {
-            let function = self.unit.function(name).map_err(|(line, message)| {
-                self.line = line;
-                message
-            })?;
-            self.functions.insert(name.to_owned(), function);
-        }
-        let function = self.functions.get(name).cloned().ok_or("no such function")?;
+        let function = self.unit.function(name).map_err(|(line, message)| {
+            self.line = line;
+            message
+        })?;
         if self.depth >= MOST_CALLS {
             return Err("calls nested too deeply".into());
         }
@@ -101,16 +95,23 @@ impl<'a, 'u> Walk<'a, 'u> {
 
     /// Stops at a return: its value, if it has one.
     fn statements(&mut self, statements: &[Statement]) -> Result<Option<Option<Value>>, Wrong> {
-        let names = self.names.clone();
+        // most blocks declare nothing, and bodies of loops are walked turn by turn
+        let declares = statements
+            .iter()
+            .any(|statement| matches!(statement.what, What::Declare { .. } | What::For { .. }));
+        let names = declares.then(|| self.names.clone());
+        let mut returned = None;
         for statement in statements {
             self.line = statement.line;
-            if let Some(returned) = self.statement(&statement.what)? {
-                self.names = names;
-                return Ok(Some(returned));
+            returned = self.statement(&statement.what)?;
+            if returned.is_some() {
+                break;
             }
         }
-        self.names = names;
-        Ok(None)
+        if let Some(names) = names {
+            self.names = names;
+        }
+        Ok(returned)
     }
 
     fn statement(&mut self, what: &What) -> Result<Option<Option<Value>>, Wrong> {

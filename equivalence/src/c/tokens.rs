@@ -1,5 +1,6 @@
 //! C text to tokens: comments dropped, conditions and object-like macros of the preprocessor applied.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use crate::machine::Wrong;
@@ -40,8 +41,9 @@ pub(crate) fn tokens(file: &str, text: &str, macros: &mut Macros) -> Result<Vec<
     let mut open: Vec<(bool, bool)> = Vec::new();
     let mut lines = text.lines().enumerate();
     while let Some((index, first)) = lines.next() {
-        let (line, mut whole) = (index + 1, first.to_owned());
+        let (line, mut whole) = (index + 1, Cow::Borrowed(first));
         while whole.ends_with('\\') {
+            let whole = whole.to_mut();
             whole.pop();
             whole.push_str(lines.next().map_or("", |(_, next)| next));
         }
@@ -51,7 +53,9 @@ pub(crate) fn tokens(file: &str, text: &str, macros: &mut Macros) -> Result<Vec<
             Some(directive) => apply(directive.trim_start(), line, active, &mut open, macros).map_err(refused)?,
             None if active => {
                 let mut found = split(&whole, line).map_err(refused)?;
-                expand(&mut found, macros, 0);
+                if found.iter().any(|token| stands_for_others(token, macros)) {
+                    expand(&mut found, macros, 0);
+                }
                 out.append(&mut found);
             }
             None => {}
@@ -129,6 +133,10 @@ fn apply(
     Ok(())
 }
 
+fn stands_for_others(token: &Token, macros: &Macros) -> bool {
+    matches!(&token.kind, Kind::Name(name) if macros.contains_key(name))
+}
+
 /// Puts the bodies of macros in the place of their names.
 pub(crate) fn expand(tokens: &mut Vec<Token>, macros: &Macros, depth: usize) {
     // a macro that names itself stays as it is at the latest here
@@ -189,7 +197,9 @@ pub(crate) fn split(text: &str, line: usize) -> Result<Vec<Token>, Wrong> {
             (Kind::Text(inner[..end].to_owned()), &inner[end + 1..])
         } else {
             let mut symbols = SYMBOLS.iter().chain(&MORE);
-            let symbol = symbols.find(|symbol| rest.starts_with(**symbol));
+            // the first byte tells nearly all of them apart
+            let byte = rest.as_bytes()[0];
+            let symbol = symbols.find(|symbol| symbol.as_bytes()[0] == byte && rest.starts_with(**symbol));
             let symbol = symbol.ok_or_else(|| format!("the character `{first}`"))?;
             (Kind::Symbol(symbol), &rest[symbol.len()..])
         };

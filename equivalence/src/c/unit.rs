@@ -1,8 +1,10 @@
 //! A translation unit: where its types, tables and functions stand. Bodies are read when they are called, so that what a step never
 //! reaches (the network, the checks of the tables) may hold anything.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::rc::Rc;
 
 use super::parse::{Fault, Parser};
 use super::syntax::{Expr, Function, Member, Type};
@@ -67,6 +69,8 @@ pub(crate) struct Unit {
     records: BTreeMap<String, Record>,
     functions: BTreeMap<String, Definition>,
     tables: BTreeMap<String, Definition>,
+    /// Functions that were parsed: a step is walked through several times.
+    parsed: RefCell<BTreeMap<String, Rc<Function>>>,
 }
 
 impl Unit {
@@ -89,6 +93,7 @@ impl Unit {
             records: BTreeMap::new(),
             functions: BTreeMap::new(),
             tables: BTreeMap::new(),
+            parsed: RefCell::default(),
         };
         unit.scan()
             .map_err(|(line, message)| Refusal::at(source.0, line, message))?;
@@ -232,8 +237,17 @@ impl Unit {
         self.functions.contains_key(name)
     }
 
-    /// Parses a function.
-    pub(crate) fn function(&self, name: &str) -> Result<Function, Fault> {
+    /// A function, parsed when it is first asked for.
+    pub(crate) fn function(&self, name: &str) -> Result<Rc<Function>, Fault> {
+        if let Some(function) = self.parsed.borrow().get(name) {
+            return Ok(Rc::clone(function));
+        }
+        let function = Rc::new(self.parse(name)?);
+        self.parsed.borrow_mut().insert(name.to_owned(), Rc::clone(&function));
+        Ok(function)
+    }
+
+    fn parse(&self, name: &str) -> Result<Function, Fault> {
         let definition = self
             .functions
             .get(name)

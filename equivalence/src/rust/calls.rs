@@ -13,29 +13,29 @@ const MOST_CALLS: usize = 32;
 impl Walk<'_, '_> {
     /// Calls a function of the file.
     pub(super) fn enter(&mut self, name: &str, arguments: Vec<Value>) -> Result<Value, Fault> {
-        let function = self.unit.functions.get(name).cloned();
+        let unit = self.unit;
+        let function = unit.functions.get(name);
         let function = function.ok_or_else(|| (0, format!("the function `{name}` is not there")))?;
-        let place = at(&function.body, "");
+        // the place of a fault: to find a line costs more than most calls
+        let refused = |message: &str| at(&function.body, message);
         if self.depth >= MOST_CALLS {
-            return Err((place.0, "calls nested too deeply".into()));
+            return Err(refused("calls nested too deeply"));
         }
         let mut arguments = arguments.into_iter();
         let outer = std::mem::take(&mut self.names);
         if function.has_self {
-            let receiver = arguments
-                .next()
-                .ok_or_else(|| (place.0, "a method without a receiver".to_owned()))?;
+            let receiver = arguments.next().ok_or_else(|| refused("a method without a receiver"))?;
             let receiver = self.machine.put(receiver);
             self.names.insert("self".into(), receiver);
         }
         if function.parameters.len() != arguments.len() {
-            return Err((place.0, format!("`{name}` with another number of arguments")));
+            return Err(refused(&format!("`{name}` with another number of arguments")));
         }
         for ((pattern, of), argument) in function.parameters.iter().zip(arguments) {
             if let (Some(kind), Value::Number(number)) = (kind_of(of), &argument)
                 && number.kind != kind
             {
-                return Err((place.0, format!("`{name}` with an argument of another type")));
+                return Err(refused(&format!("`{name}` with an argument of another type")));
             }
             self.bind(pattern, argument)?;
         }

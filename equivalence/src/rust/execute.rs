@@ -49,12 +49,15 @@ impl<'a, 'u> Walk<'a, 'u> {
     }
 
     pub(super) fn block(&mut self, block: &Block, hint: Option<Kind>) -> Result<Value, Fault> {
-        let names = self.names.clone();
+        let declares = block.stmts.iter().any(|statement| matches!(statement, Stmt::Local(_)));
+        let names = declares.then(|| self.names.clone());
         let mut value = nothing();
         for statement in &block.stmts {
             value = self.statement(statement, hint)?;
         }
-        self.names = names;
+        if let Some(names) = names {
+            self.names = names;
+        }
         Ok(value)
     }
 

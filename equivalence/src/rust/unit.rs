@@ -9,7 +9,6 @@ use crate::machine::{I32, Kind, U32, U64, Wrong};
 use crate::refusal::Refusal;
 
 /// A function or method: parameters without the receiver, and its block.
-#[derive(Clone)]
 pub(crate) struct Function {
     pub has_self: bool,
     pub parameters: Vec<(Pat, Type)>,
@@ -36,41 +35,39 @@ impl Unit {
             constants: BTreeMap::new(),
             records: BTreeMap::new(),
         };
-        for item in &parsed.items {
+        for item in parsed.items {
             unit.item("", item);
         }
         Ok(unit)
     }
 
     /// Names inside of a module or of `Controller` are written as they are called: `status::HELD`, `Self::new`.
-    fn item(&mut self, prefix: &str, item: &Item) {
+    fn item(&mut self, prefix: &str, item: Item) {
         let named = |ident: &syn::Ident| format!("{prefix}{ident}");
         match item {
             Item::Fn(function) => {
-                let read = function_of(&function.sig, &function.block);
-                self.functions.insert(named(&function.sig.ident), read);
+                let name = named(&function.sig.ident);
+                self.functions.insert(name, function_of(function.sig, *function.block));
             }
             Item::Const(item) => {
-                self.constants
-                    .insert(named(&item.ident), ((*item.ty).clone(), (*item.expr).clone()));
+                self.constants.insert(named(&item.ident), (*item.ty, *item.expr));
             }
             Item::Static(item) => {
-                self.constants
-                    .insert(named(&item.ident), ((*item.ty).clone(), (*item.expr).clone()));
+                self.constants.insert(named(&item.ident), (*item.ty, *item.expr));
             }
             Item::Struct(item) => self.record(item),
             Item::Mod(module) => {
                 let inner = format!("{}::", named(&module.ident));
-                for item in module.content.iter().flat_map(|(_, items)| items) {
+                for item in module.content.into_iter().flat_map(|(_, items)| items) {
                     self.item(&inner, item);
                 }
             }
             // what implements a trait is called under the trait's name, which no step does
             Item::Impl(item) if is_controller(&item.self_ty) && item.trait_.is_none() => {
-                for item in &item.items {
+                for item in item.items {
                     if let ImplItem::Fn(function) = item {
-                        let read = function_of(&function.sig, &function.block);
-                        self.functions.insert(format!("Self::{}", function.sig.ident), read);
+                        let name = format!("Self::{}", function.sig.ident);
+                        self.functions.insert(name, function_of(function.sig, function.block));
                     }
                 }
             }
@@ -78,12 +75,12 @@ impl Unit {
         }
     }
 
-    fn record(&mut self, item: &ItemStruct) {
-        let Fields::Named(fields) = &item.fields else { return };
+    fn record(&mut self, item: ItemStruct) {
+        let Fields::Named(fields) = item.fields else { return };
         let named = fields
             .named
-            .iter()
-            .filter_map(|field| Some((field.ident.as_ref()?.to_string(), field.ty.clone())));
+            .into_iter()
+            .filter_map(|field| Some((field.ident.as_ref()?.to_string(), field.ty)));
         self.records.insert(item.ident.to_string(), named.collect());
     }
 }
@@ -92,19 +89,20 @@ fn is_controller(of: &Type) -> bool {
     matches!(of, Type::Path(path) if path.path.is_ident("Controller"))
 }
 
-fn function_of(signature: &Signature, body: &syn::Block) -> Function {
-    let typed = signature.inputs.iter().filter_map(|input| match input {
-        FnArg::Typed(typed) => Some(((*typed.pat).clone(), (*typed.ty).clone())),
+fn function_of(signature: Signature, body: syn::Block) -> Function {
+    let has_self = signature.receiver().is_some();
+    let typed = signature.inputs.into_iter().filter_map(|input| match input {
+        FnArg::Typed(typed) => Some((*typed.pat, *typed.ty)),
         FnArg::Receiver(_) => None,
     });
     Function {
-        has_self: signature.receiver().is_some(),
+        has_self,
         parameters: typed.collect(),
-        result: match &signature.output {
-            ReturnType::Type(_, of) => Some((**of).clone()),
+        result: match signature.output {
+            ReturnType::Type(_, of) => Some(*of),
             ReturnType::Default => None,
         },
-        body: body.clone(),
+        body,
     }
 }
 

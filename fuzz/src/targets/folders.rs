@@ -1,8 +1,17 @@
 //! A temporary folder for readers that open a path.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
+
+/// A temporary folder: in memory where the system has it as a folder, since a disk would be what is measured.
+pub(crate) fn folder() -> std::io::Result<TempDir> {
+    let memory = Path::new("/dev/shm");
+    match memory.is_dir() {
+        true => tempfile::tempdir_in(memory),
+        false => tempfile::tempdir(),
+    }
+}
 
 pub(super) struct Desk {
     folder: TempDir,
@@ -10,15 +19,8 @@ pub(super) struct Desk {
 
 impl Desk {
     pub fn new() -> Result<Self, String> {
-        // memory where the system has it as a folder: a disk would be what is measured
-        let memory = PathBuf::from("/dev/shm");
-        let folder = match memory.is_dir() {
-            true => tempfile::tempdir_in(memory),
-            false => tempfile::tempdir(),
-        };
-        Ok(Desk {
-            folder: folder.map_err(|error| format!("cannot make a folder: {error}"))?,
-        })
+        let folder = folder().map_err(|error| format!("cannot make a folder: {error}"))?;
+        Ok(Desk { folder })
     }
 
     /// The path of `name`, which holds `bytes` from now on.

@@ -12,6 +12,8 @@ mod seeds;
 mod steps;
 mod tools;
 
+pub(crate) use folders::folder;
+
 use crate::forms::Form;
 use crate::guard::{Limits, Reader};
 

@@ -2,7 +2,7 @@
 
 use policy::Shape;
 
-use super::driver::{BITS_AND_FINITE, BOTH, Entry, ONE, Writer};
+use super::driver::{BITS_AND_FINITE, BOTH, COARSE, COARSE_FIRST, Entry, FINE, ONE, Writer};
 use super::head::Answer;
 use super::stated::stated;
 
@@ -71,7 +71,7 @@ impl Writer<'_> {
             runs: BOTH,
             assumed: &[],
             merged: Vec::new(),
-            precision: 2,
+            precisions: COARSE_FIRST,
         }
     }
 
@@ -207,7 +207,7 @@ impl Writer<'_> {
             runs: BOTH,
             assumed: &[],
             merged: Vec::new(),
-            precision: 2,
+            precisions: COARSE_FIRST,
         }
     }
 
@@ -257,7 +257,7 @@ impl Writer<'_> {
             runs: if self.is_integer() { ONE } else { BITS_AND_FINITE },
             assumed: &[],
             merged: self.curves(),
-            precision: self.sums_precision(),
+            precisions: self.sums_precisions(),
         }
     }
 
@@ -279,17 +279,21 @@ impl Writer<'_> {
             runs: ONE,
             assumed: &["q_values"],
             merged: Vec::new(),
-            precision: 2,
+            precisions: COARSE_FIRST,
         }
     }
 
     /// Sums and hinges need no relations between values; a rational function of one value in numerator and denominator does.
-    fn sums_precision(&self) -> u8 {
+    pub fn sums_precisions(&self) -> &'static [u8] {
         let hinges = self
             .policy
             .layers
             .iter()
             .all(|layer| matches!(layer.activation.shape(), Shape::Hinge { .. }));
-        if hinges && !self.is_integer() { 0 } else { 2 }
+        match (self.is_integer(), hinges) {
+            (true, true) => COARSE_FIRST,
+            (false, true) => COARSE,
+            (_, false) => FINE,
+        }
     }
 }

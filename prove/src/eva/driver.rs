@@ -30,6 +30,12 @@ const VOUCHED: &[&str] = &["choose", "mapping_flips"];
 pub(super) const BITS_AND_FINITE: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any), (LITTLE, Numbers::Finite)];
 /// Both byte orders, every bit pattern.
 pub(super) const BOTH: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any), (BIG, Numbers::Any)];
+/// Intervals alone, which take half of the time and are nearly always enough; then with equalities between values.
+pub(super) const COARSE_FIRST: &[u8] = &[0, 2];
+/// With equalities between values: a NaN behind the limiter is caught by bits of the number that it was.
+pub(super) const FINE: &[u8] = &[2];
+/// Sums and hinges of floats: equalities would show nothing more.
+pub(super) const COARSE: &[u8] = &[0];
 /// What has no bytes in another order: arithmetic alone.
 pub(super) const ONE: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any)];
 
@@ -48,8 +54,8 @@ pub(super) struct Entry {
     pub assumed: &'static [&'static str],
     /// Functions of the policy, without its prefix, in which cases are not kept apart.
     pub merged: Vec<String>,
-    /// Frama-C's `-eva-precision`: 2 keeps equalities between values, which sums of a network do not need.
-    pub precision: u8,
+    /// Frama-C's `-eva-precision`, in the order in which they are tried until one shows everything.
+    pub precisions: &'static [u8],
 }
 
 /// A file of C and its entries.
@@ -177,7 +183,11 @@ impl Writer<'_> {
             runs: BITS_AND_FINITE,
             assumed: if self.is_integer() { &[] } else { &["q_values"] },
             merged: self.curves(),
-            precision: 2,
+            precisions: if self.is_integer() {
+                self.sums_precisions()
+            } else {
+                COARSE_FIRST
+            },
         }
     }
 
@@ -240,7 +250,11 @@ impl Writer<'_> {
             runs: if self.takes_output_as_it_is() { BOTH } else { STEP },
             assumed: if self.policy.mapping.is_some() { VOUCHED } else { ACTION },
             merged: Vec::new(),
-            precision: 2,
+            precisions: match self.answer() {
+                // the law multiplies what the state holds
+                Answer::Gains(_) => FINE,
+                Answer::Index | Answer::Output => COARSE_FIRST,
+            },
         }
     }
 
@@ -310,7 +324,7 @@ impl Writer<'_> {
             runs: BOTH,
             assumed: ACTION,
             merged: Vec::new(),
-            precision: 2,
+            precisions: FINE,
         }
     }
 
@@ -362,7 +376,7 @@ impl Writer<'_> {
             runs: ONE,
             assumed: ACTION,
             merged: Vec::new(),
-            precision: 2,
+            precisions: COARSE_FIRST,
         })
     }
 

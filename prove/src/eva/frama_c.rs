@@ -61,27 +61,51 @@ pub(super) fn version(stop: &Stop) -> Option<String> {
     Some(format!("Frama-C {}", text.trim()))
 }
 
-/// Analyses one entry of `driver.c` in a folder.
+/// One entry of `driver.c` in a folder.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Analysis<'a> {
+    pub folder: &'a Path,
+    /// Name of the policy.
+    pub policy: &'a str,
+    pub labels: &'a Labels,
+    pub entry: &'a Entry,
+    pub machine: Machine,
+    pub numbers: Numbers,
+}
+
+/// Analyses the entry, ever more precisely until everything is shown. What is shown with little precision is shown.
 ///
 /// # Errors
 /// If the user has had enough.
-pub(super) fn analyse(
-    folder: &Path,
-    policy: &str,
-    labels: &Labels,
-    entry: &Entry,
-    machine: Machine,
-    numbers: Numbers,
-    stop: &Stop,
-) -> Result<Found, program::Stopped> {
+pub(super) fn analyse(analysis: Analysis<'_>, stop: &Stop) -> Result<Found, program::Stopped> {
+    let mut found = Found::default();
+    for precision in analysis.entry.precisions {
+        let seconds = found.seconds;
+        found = once(analysis, *precision, stop)?;
+        found.seconds += seconds;
+        if found.failure.is_empty() && found.reached && found.alarms.is_empty() && found.open.is_empty() {
+            break;
+        }
+    }
+    Ok(found)
+}
+
+fn once(analysis: Analysis<'_>, precision: u8, stop: &Stop) -> Result<Found, program::Stopped> {
     let begun = Instant::now();
+    let Analysis {
+        folder,
+        policy,
+        labels,
+        machine,
+        numbers,
+        ..
+    } = analysis;
     let Entry {
         function: entry,
         assumed,
         merged,
-        precision,
         ..
-    } = entry;
+    } = analysis.entry;
     let table = folder.join(format!("{entry}-{}-{numbers:?}.csv", machine.0));
     let finite = match numbers {
         Numbers::Any => "",
@@ -96,6 +120,8 @@ pub(super) fn analyse(
     command.current_dir(folder).env("TMPDIR", folder);
     // it takes the folder from there
     command.env("PWD", folder);
+    // all plugins together take longer to load than a small driver to analyse
+    command.args(["-no-autoload-plugins", "-load-module", "eva,report"]);
     command.args(["-eva", FILE, "-main", entry, "-machdep", machine.0]);
     // without __GNUC__ the portable text is taken; the two flags keep the preprocessor from announcing excess precision
     command.arg(format!(

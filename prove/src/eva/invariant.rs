@@ -143,15 +143,15 @@ fn memories(policy: &Policy) -> Vec<Shown> {
 }
 
 /// Largest number of slices of a word; with so many a run takes seconds.
-const MOST_SLICES: usize = 400;
+const MOST_SLICES: usize = 230;
 
 /// The ends of slices from -bound to bound, ascending; `None` where too many would be needed.
 ///
 /// A slice from `lo` to `hi` is kept by `y + k(x - y)` with `|x| <= X` if `hi + k(X - lo) <= M`, that is if its width is at
 /// most `(M - hi)(1 - k)/k` and what M exceeds X by. So the distance to the end may shrink by a factor from slice to slice.
 pub(super) fn slices(bound: f64, gain: f64) -> Option<Vec<f64>> {
-    // half of what is allowed, and never more than a half: room for the roundings
-    let ratio = (1.0 + 0.5 * (1.0 - gain) / gain).min(2.0);
+    // nine tenths of what is allowed: the rest, and what M exceeds X by, is room for the roundings. Beyond 8 few slices are saved
+    let ratio = (1.0 + 0.9 * (1.0 - gain) / gain).min(8.0);
     // M exceeds X by 2^-19 of itself (contract section 1), and the last slice may be a quarter of that
     let last = bound / f64::from(1 << 21);
     let mut distances = Vec::new();
@@ -163,6 +163,7 @@ pub(super) fn slices(bound: f64, gain: f64) -> Option<Vec<f64>> {
         }
         distance /= ratio;
     }
+    distances.push(last);
     let upper = distances.iter().map(|distance| bound - distance).chain([bound]);
     let upper: Vec<f64> = upper.collect();
     let lower = upper.iter().rev().map(|end| -end);
@@ -179,7 +180,7 @@ mod tests {
         let ends = slices(3.0, 0.1).expect("few");
         assert_eq!((ends[0], ends[ends.len() - 1]), (-3.0, 3.0));
         assert!(ends.windows(2).all(|pair| pair[0] < pair[1]), "{ends:?}");
-        assert!(ends.len() < 60, "{}", ends.len());
+        assert!(ends.len() < 25, "{}", ends.len());
         assert_eq!(slices(3.0, 0.9999), None);
     }
 

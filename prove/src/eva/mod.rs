@@ -22,7 +22,7 @@ use crate::claim::{Claim, Verdict};
 use crate::program::Stopped;
 use crate::{Prover, Task, Watch};
 use driver::{Driver, Entry};
-use frama_c::{Found, INSTALL, Machine, Numbers};
+use frama_c::{Analysis, Found, INSTALL, Machine, Numbers};
 use text::Labels;
 
 /// Frama-C Eva on the generated C: no run-time error, limits, invariant.
@@ -201,15 +201,15 @@ fn run_all(
                         index + 1,
                         jobs.len()
                     ));
-                    let found = frama_c::analyse(
+                    let analysis = Analysis {
                         folder,
-                        &policy.name,
+                        policy: &policy.name,
                         labels,
-                        job.entry,
-                        job.machine,
-                        job.numbers,
-                        watch.stop,
-                    );
+                        entry: job.entry,
+                        machine: job.machine,
+                        numbers: job.numbers,
+                    };
+                    let found = frama_c::analyse(analysis, watch.stop);
                     let mut results = results.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
                     results[index] = Some(found);
                 }

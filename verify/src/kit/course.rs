@@ -35,6 +35,13 @@ const BESIDE: i32 = 100;
 // a convention, as is everything that bounds a kit's memory
 const TIES: usize = 4;
 
+/// What of a step is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Seen {
+    Numbers,
+    CommandAndState,
+}
+
 /// The interpreter on its way, and what is written down.
 pub struct Course<'a, T> {
     policy: &'a Policy,
@@ -58,7 +65,20 @@ impl<'a, T: Real> Course<'a, T> {
 
     fn play(&mut self, event: Event) -> Result<(), InputError> {
         let chunk = self.oracle.chunk_of(vec![event])?;
-        append(self.policy, &self.layout, &chunk, &mut self.trace);
+        append(self.policy, &self.layout, &chunk, Seen::Numbers, &mut self.trace);
+        Ok(())
+    }
+
+    /// A step in which a NaN arises: of observation and Q values the contract does not say which one.
+    fn play_without_numbers(&mut self, samples: &[Sample]) -> Result<(), InputError> {
+        let chunk = self.oracle.chunk_of(vec![Event::Step(samples.to_vec())])?;
+        append(
+            self.policy,
+            &self.layout,
+            &chunk,
+            Seen::CommandAndState,
+            &mut self.trace,
+        );
         Ok(())
     }
 
@@ -109,13 +129,12 @@ impl<'a, T: Real> Course<'a, T> {
         let usual = directed::usual(self.policy);
         let fresh = Controller::<T>::new(self.policy);
         for damage in damages(self.policy, &fresh) {
-            // which NaN comes out of an operation the contract does not say
-            if damage.gives_no_number(&fresh, &usual) {
-                continue;
-            }
             self.play(Event::Init)?;
             self.put(|state| damage.apply(state));
-            self.play(Event::Step(usual.clone()))?;
+            match damage.gives_no_number(&fresh, &usual) {
+                true => self.play_without_numbers(&usual)?,
+                false => self.play(Event::Step(usual.clone()))?,
+            }
         }
         Ok(())
     }
@@ -195,7 +214,7 @@ impl<'a, T: Real> Course<'a, T> {
         self.play(Event::Init)?;
         let mut stream = Stream::new(self.policy, seed, &[]);
         let chunk = self.oracle.next_chunk(&mut stream, left)?;
-        append(self.policy, &self.layout, &chunk, &mut self.trace);
+        append(self.policy, &self.layout, &chunk, Seen::Numbers, &mut self.trace);
         Ok(())
     }
 }
@@ -290,6 +309,12 @@ fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>> {
             )
         }
     }));
+    // behind a network that passes a NaN on no Q value wins
+    damages.push(Damage {
+        check: CheckWord::Anew,
+        counters: Some((0, 1)),
+        ..Damage::of_numbers(ends.iter().map(|(at, _)| (*at, T::nearest(f64::NAN))).collect())
+    });
     for &(at, (low, high)) in &ends {
         let (below, above) = (scalar.next_down(low.to_f64()), scalar.next_up(high.to_f64()));
         // what is no number gives one of many in the observation, and the contract does not say which
@@ -360,7 +385,7 @@ fn end_of_soft_start<T: Real>(policy: &Policy, scalar: Scalar, state: &State<T>)
 }
 
 /// Appends the words of a chunk in the form of the kit: its layout is that of [`crate::protocol`].
-fn append(policy: &Policy, layout: &Layout, chunk: &Chunk, trace: &mut Trace) {
+fn append(policy: &Policy, layout: &Layout, chunk: &Chunk, seen: Seen, trace: &mut Trace) {
     let number = layout.scalar().words();
     let values = number * (policy.features.len() + policy.outputs());
     let (mut input, mut expected) = (chunk.input.as_slice(), chunk.expected.as_slice());
@@ -374,8 +399,12 @@ fn append(policy: &Policy, layout: &Layout, chunk: &Chunk, trace: &mut Trace) {
                 let (command, state) = rest.split_at(2 * number + 2);
                 // the last word is the driver's verdict on purity
                 let state = &state[..state.len() - 1];
-                let rest = before.iter().chain(state).copied();
-                trace.step(take(&mut input, sample_words(policy)), command, rest);
+                let state = state.iter().copied();
+                let measurement = take(&mut input, sample_words(policy));
+                match seen {
+                    Seen::Numbers => trace.step(measurement, command, before.iter().copied().chain(state)),
+                    Seen::CommandAndState => trace.step_without_numbers(measurement, command, state),
+                }
             }
             Event::SetMapping { r, .. } => {
                 let coefficients = take(&mut input, 4 * number);

@@ -69,8 +69,8 @@ impl Texts<'_> {
         let crc = if self.is_wide() { "crc_numbers" } else { "crc" };
         let last = 2 * self.program.scalar().words() + 2;
         vec![
-            format!("crc = {k}_{crc}(0xFFFFFFFFu, observation, {u}_FEATURES);"),
-            format!("crc = {k}_{crc}(crc, q, {u}_ACTIONS);"),
+            format!("crc = {k}_{crc}(0xFFFFFFFFu, observation, are_numbers * {u}_FEATURES);"),
+            format!("crc = {k}_{crc}(crc, q, are_numbers * {u}_ACTIONS);"),
             format!("crc = {};", self.state_crc("crc", "state->")),
             self.check("CRC of observation, Q values, state", last, "crc ^ 0xFFFFFFFFu"),
             format!("return word + {};", last + 1),

@@ -9,6 +9,7 @@ mod kind {
     pub const RESET: u32 = 2;
     pub const INIT: u32 = 3;
     pub const DAMAGE: u32 = 4;
+    pub const STEP_WITHOUT_NUMBERS: u32 = 5;
 }
 
 /// Moves and answers, one after the other.
@@ -41,7 +42,16 @@ impl Trace {
     /// A control step: bits of the measurement, then bits of duty, duty_sim, action index, status; of `rest`
     /// (observation, Q values, state afterwards) the checksum alone is kept.
     pub fn step(&mut self, measurement: &[u32], command: &[u32], rest: impl IntoIterator<Item = u32>) {
-        self.open(kind::STEP);
+        self.step_of(kind::STEP, measurement, command, rest);
+    }
+
+    /// A control step in which a NaN arises: as [`Trace::step`], with the state afterwards alone for `rest`.
+    pub fn step_without_numbers(&mut self, measurement: &[u32], command: &[u32], state: impl IntoIterator<Item = u32>) {
+        self.step_of(kind::STEP_WITHOUT_NUMBERS, measurement, command, state);
+    }
+
+    fn step_of(&mut self, kind: u32, measurement: &[u32], command: &[u32], rest: impl IntoIterator<Item = u32>) {
+        self.open(kind);
         self.words.extend_from_slice(measurement);
         self.words.extend_from_slice(command);
         // a checksum for the rest: the kit lies in the flash of a board, where each word counts

@@ -44,7 +44,7 @@ fn spread(keys: &[&str]) -> Vec<Spread> {
 #[test]
 fn the_nominal_converter_of_a_spread_does_what_it_does_alone_and_the_others_do_not() {
     let found = run(setting("")
-        .spread(spread(&["converter.inductance=1.6e-3,2.4e-3,3"]))
+        .spread(spread(&["converter.inductance=1.6e-3,2.4e-3,3"]), None)
         .unwrap());
     let cells = &found.spread.as_ref().unwrap().cells;
     let deviations = |name: &str| -> Vec<f64> {
@@ -75,7 +75,7 @@ fn classical_controllers_keep_the_design_of_the_nominal_converter() {
     let nominal = tail(setting(halved).designed_on(&plant).unwrap());
     assert_ne!(own, nominal);
     let of_spread = run(setting("")
-        .spread(spread(&["converter.inductance=1e-3,2e-3,2"]))
+        .spread(spread(&["converter.inductance=1e-3,2e-3,2"]), None)
         .unwrap());
     let cells = of_spread.spread.unwrap().cells;
     let found = cells[0]
@@ -95,7 +95,7 @@ fn two_numbers_make_a_map_for_each_controller() {
         "converter.inductance=1.7e-3,2.3e-3,2",
         "converter.capacitance=1.3e-3,1.7e-3,3",
     ];
-    let found = run(setting("").spread(spread(&two)).unwrap());
+    let found = run(setting("").spread(spread(&two), None).unwrap());
     assert_eq!(found.spread.as_ref().unwrap().cells.len(), 6);
     let files = found.files().unwrap();
     assert!(files.contains_key("spread-policy.svg") && files.contains_key("spread-feed-forward.svg"));
@@ -117,9 +117,9 @@ fn what_is_no_spread_is_refused() {
         assert!(said.contains(words), "{text}: {said}");
     }
     let thrice = spread(&["load.bleed=1,2", "load.v_fold=1,2", "converter.v_in=190,200"]);
-    assert!(setting("").spread(thrice).is_err());
+    assert!(setting("").spread(thrice, None).is_err());
     let twice = spread(&["load.v_fold=1,2", "load.v_fold=1,2"]);
-    assert!(setting("").spread(twice).is_err());
+    assert!(setting("").spread(twice, None).is_err());
     let other = examples().join("plants/boost-24-48.toml");
     let said = setting("").designed_on(&other).unwrap_err().to_string();
     assert!(said.contains("a boost at 100000 Hz"), "{said}");

@@ -30,6 +30,7 @@ pub mod seeds;
 pub mod settings;
 pub mod start;
 pub mod summary;
+pub mod tensorboard;
 pub mod trainer;
 
 pub use closed_loop::scenario::Metrics;

@@ -21,9 +21,11 @@ use report::grouped;
 
 mod kept;
 mod progress;
+mod tensorboard;
 
 use kept::Kept;
 use progress::Watcher;
+use tensorboard::Events;
 
 /// Time between two checkpoints on the way. A kill or a power cut may cost five seconds of work; the rest is for a look at
 /// the selection scenarios and for writing.
@@ -59,9 +61,13 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
         checkpoints: kept.prepare(&settings.seeds, options.resume)?,
         checkpoint_every: Some(CHECKPOINT_EVERY),
     };
+    let events = options.tensorboard.as_deref();
+    let events = events
+        .map(|folder| Events::new(folder, &settings.seeds, options.resume))
+        .transpose()?;
     let stop = interruption::stop_on_signal();
     let start = Instant::now();
-    let watcher = Watcher::new(&settings, &kept, &stop);
+    let watcher = Watcher::new(&settings, &kept, events.as_ref(), &stop);
     let result = train_all(&settings, &contract, &converter, &course, &stop, &watcher);
     watcher.finish()?;
     let runs = result?;
@@ -73,7 +79,10 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     };
     write(options, &settings, &runs, best)?;
     kept.remove();
-    report(options, &settings, &runs, best, start.elapsed())
+    let outcome = report(options, &settings, &runs, best, start.elapsed())?;
+    // behind the answer: the policy is there all the same
+    events.map_or(Ok(()), |events| events.failure())?;
+    Ok(outcome)
 }
 
 /// Reads every file that is named, and trains nothing.
@@ -159,6 +168,9 @@ fn interrupted(
     if !options.seeds.is_empty() {
         let seeds: Vec<String> = options.seeds.iter().map(u64::to_string).collect();
         resume.push_str(&format!(" --seeds {}", seeds.join(",")));
+    }
+    if let Some(folder) = &options.tensorboard {
+        resume.push_str(&format!(" --tensorboard {}", folder.display()));
     }
     resume.push_str(" --resume");
     if options.json {

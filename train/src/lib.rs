@@ -24,6 +24,7 @@ pub mod outcome;
 pub mod page;
 mod progress;
 pub mod replay;
+mod rest_page;
 mod resume;
 pub mod score;
 pub mod seeds;

@@ -77,7 +77,7 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     let Some(best) = seeds::best(&runs) else {
         return Err(Message::new("no seed was trained").into());
     };
-    write(options, &settings, &runs, best)?;
+    write(options, &settings, &runs, best, &converter)?;
     kept.remove();
     let outcome = report(options, &settings, &runs, best, start.elapsed())?;
     // behind the answer: the policy is there all the same
@@ -97,7 +97,13 @@ pub fn check(options: &Train) -> Result<(), Failure> {
 }
 
 /// Writes the seeds' folders, the best one's last: a folder with a `policy.toml` is a whole training.
-fn write(options: &Train, settings: &Settings, runs: &[SeedRun], best: &Trained) -> Result<(), Failure> {
+fn write(
+    options: &Train,
+    settings: &Settings,
+    runs: &[SeedRun],
+    best: &Trained,
+    converter: &Converter,
+) -> Result<(), Failure> {
     let out = &options.out;
     for outcome in runs.iter().filter_map(|run| run.outcome.as_ref()) {
         output::write_all(&out.join(SEEDS).join(outcome.seed.to_string()), &outcome.files)?;
@@ -109,7 +115,11 @@ fn write(options: &Train, settings: &Settings, runs: &[SeedRun], best: &Trained)
         ("contract", settings.contract.display().to_string()),
         ("plant", settings.plant.display().to_string()),
     ];
-    let page = made::signed_page(&page::page(settings, runs, best)?, &[("--out", "policy")], &read)?;
+    let page = made::signed_page(
+        &page::page(settings, runs, best, converter)?,
+        &[("--out", "policy")],
+        &read,
+    )?;
     files.insert(PAGE.to_owned(), page.into_bytes());
     output::write_all(out, &files)
 }

@@ -100,7 +100,8 @@ fn behind_an_observer_all_four_hold_the_voltage_of_a_converter_with_losses() {
         names(&found),
         ["policy", "law alone", "pid", "cascade", "feed-forward", "deadbeat"]
     );
-    for (name, course) in &found.steps[0].courses {
+    // the network, whose weights are 0, chooses the first offset for ever
+    for (name, course) in found.steps[0].courses.iter().skip(1) {
         let worst = course.finding.worst;
         // without the bias losses of up to 1.6 V would leave feed-forward and deadbeat, whose integrals are slow, far off
         assert!(worst.tail_max < 0.1 && worst.deviation < 3.0, "{name}: {worst:?}");

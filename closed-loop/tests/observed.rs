@@ -6,7 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use closed_loop::simulation::{Findings, Setting, simulate};
-use closed_loop::{Named, Scenario, interpreter};
+use closed_loop::{Converter, Named, Scenario, interpreter, rest_map};
+use plant::Load;
 use policy::Policy;
 use tempfile::TempDir;
 
@@ -146,4 +147,38 @@ fn an_observer_that_the_policy_does_not_have_is_refused() {
     let without = policy::load(&examples().join("buck12/policy.toml")).unwrap();
     let said = refused("observer = \"model\"\n", &without);
     assert!(said.contains("[[observer]]"), "{said}");
+}
+
+/// The law of the contract on estimates that are predicted one period ahead: with T/L = 0.05 A/V and T/C = 1/15 V/A a volt becomes
+/// `1 - T^2/(2 L C)` V and `-(T/L)(1 + that)/2` A, an ampere `T/C` V and `1 - T^2/(2 L C)` A.
+#[test]
+fn the_map_around_rest_has_the_slopes_of_the_law_behind_the_predicted_estimates() {
+    // everywhere in the dead zone: the network adds nothing
+    let (_folder, policy) = measured(|text| {
+        text.replace("within = 0.25", "within = 100.0")
+            .replace("within = 1.0", "within = 100.0")
+    });
+    let set = [("pwm.duty_delay".to_owned(), 1.0)];
+    let converter = Converter::load(examples().join("plants/paper-model.toml"), &set).unwrap();
+    let axes = [vec![-0.1, 0.1], vec![-0.5, 0.5]];
+    let map = rest_map(&policy, &converter, 100.0, Load::power(500.0), axes).unwrap();
+    let (h, g) = (1e-4 / 2e-3, 1e-4 / 1.5e-3);
+    let kept = 1.0 - 0.5 * h * g;
+    let (by_current, by_voltage) = (0.104, 0.54);
+    let along_error = by_current * h * 0.5 * (1.0 + kept) - by_voltage * kept;
+    let along_current = -by_current * kept - by_voltage * g;
+    let [a, b, c, d] = map.duties.as_slice() else {
+        panic!("{:?}", map.duties)
+    };
+    for slope in [(b - a) / 0.2, (d - c) / 0.2] {
+        assert!((slope - along_error).abs() < 1e-4, "{slope} {along_error}");
+    }
+    for slope in [c - a, d - b] {
+        assert!((slope - along_current).abs() < 1e-4, "{slope} {along_current}");
+    }
+    // without noise and losses it rests at its reference, with what charges the capacitor at 0
+    assert_eq!(map.cycle.len(), 200);
+    for [error, current] in &map.cycle {
+        assert!(error.abs() < 0.02 && current.abs() < 0.05, "{error} V, {current} A");
+    }
 }

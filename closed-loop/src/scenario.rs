@@ -129,12 +129,6 @@ impl Finding {
         }
     }
 
-    /// Takes in what was found at other instants of the same load step.
-    pub fn join(&mut self, other: &Self) {
-        self.worst = self.worst.worst(other.worst);
-        self.at_sample = self.at_sample.worst(other.at_sample);
-    }
-
     /// Takes in one instant.
     pub fn add(&mut self, instant: Instant, metrics: Metrics) {
         self.worst = self.worst.worst(metrics);

@@ -41,10 +41,6 @@ pub struct Judged {
     pub findings: Vec<Finding>,
 }
 
-/// Instants of a load step between two looks at what a policy costs at least.
-// each time the lead is run once more, which is half as long as one instant: 8 % of six
-const BETWEEN_BOUNDS: usize = 6;
-
 impl<E: Environment> Trainer<E> {
     /// The plant as its file says, and those of the spread.
     pub(crate) fn places(&self) -> Vec<Place<'_, E>> {
@@ -84,56 +80,38 @@ impl<E: Environment> Trainer<E> {
 
     /// The cost grows with load steps and instants: a policy that some of them rule out is not run through the rest, and
     /// its cost is a lower bound.
-    ///
-    /// ```text
-    ///  one instant of each load step everywhere ─► bound ─► a few instants more of one load step ─► bound ─► ...
-    /// ```
-    ///
-    /// The bound is of all that has been run, so the load steps whose other instants are still to come count with their first.
     pub(crate) fn judge(&self, network: &Network) -> Result<Score, Error> {
         let selection = &self.settings.selection;
         let task = &selection.task;
         let controller = quick_controller(&self.contract, network)?;
-        let v_ref = self.settings.reward.v_ref;
         let best = self.best.as_ref().map_or(f64::INFINITY, |best| best.score.cost);
         let instants = task.all_instants();
-        let (first, others) = instants.split_at(1.min(instants.len()));
         let places = self.places();
-        let scorings: Vec<Scoring> = (places.iter())
-            .map(|place| Scoring::new(&task.load_steps, place.specification, selection.margin))
-            .collect();
-        let whole = |findings: &[Vec<Finding>]| {
-            let none = Score { met: true, cost: 0.0 };
-            scorings.iter().zip(findings).fold(none, |whole, (scoring, findings)| {
-                let score = scoring.score(findings);
-                Score {
-                    met: whole.met && score.met,
-                    cost: whole.cost + score.cost / places.len() as f64,
-                }
-            })
-        };
-        let cut_short = |score: &Score| (score.cost >= best).then_some(Score { met: false, ..*score });
-        let mut findings: Vec<Vec<Finding>> = vec![Vec::new(); places.len()];
-        for (n, place) in places.iter().enumerate() {
-            for &load_step in &task.load_steps {
-                findings[n].push(survey(&place.converter, &controller, v_ref, task, load_step, first)?);
-                if let Some(score) = cut_short(&whole(&findings)) {
-                    return Ok(score);
-                }
-            }
-        }
-        for (n, place) in places.iter().enumerate() {
-            for (k, &load_step) in task.load_steps.iter().enumerate() {
-                for few in others.chunks(BETWEEN_BOUNDS) {
-                    let found = survey(&place.converter, &controller, v_ref, task, load_step, few)?;
-                    findings[n][k].join(&found);
-                    if let Some(score) = cut_short(&whole(&findings)) {
-                        return Ok(score);
+        let mut whole = Score { met: false, cost: 0.0 };
+        // one instant of each load step first: what fails there needs none of the others
+        for instants in [&instants[..1], &instants] {
+            whole = Score { met: true, cost: 0.0 };
+            for place in &places {
+                let scoring = Scoring::new(&task.load_steps, place.specification, selection.margin);
+                let mut findings = Vec::new();
+                let mut score = scoring.score(&[]);
+                for &load_step in &task.load_steps {
+                    let v_ref = self.settings.reward.v_ref;
+                    findings.push(survey(&place.converter, &controller, v_ref, task, load_step, instants)?);
+                    score = scoring.score(&findings);
+                    let cost = whole.cost + score.cost / places.len() as f64;
+                    if cost >= best {
+                        // cut short, so nothing can be said of the rest
+                        return Ok(Score { met: false, cost });
                     }
                 }
+                whole = Score {
+                    met: whole.met && score.met,
+                    cost: whole.cost + score.cost / places.len() as f64,
+                };
             }
         }
-        Ok(whole(&findings))
+        Ok(whole)
     }
 
     /// The evaluation of a policy, the plant as its file says first; the limits are as they are, without the margin of the

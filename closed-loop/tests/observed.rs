@@ -159,7 +159,7 @@ fn the_map_around_rest_has_the_slopes_of_the_law_behind_the_predicted_estimates(
             .replace("within = 1.0", "within = 100.0")
     });
     let set = [("pwm.duty_delay".to_owned(), 1.0)];
-    let converter = Converter::load(examples().join("plants/paper-model.toml"), &set).unwrap();
+    let converter = Converter::load(examples().join("plants/paper-model.toml").as_path(), &set).unwrap();
     let axes = [vec![-0.1, 0.1], vec![-0.5, 0.5]];
     let map = rest_map(&policy, &converter, 100.0, Load::power(500.0), axes).unwrap();
     let (h, g) = (1e-4 / 2e-3, 1e-4 / 1.5e-3);

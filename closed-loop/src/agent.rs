@@ -124,6 +124,17 @@ impl<T: Real> Agent<T> {
         })
     }
 
+    /// What the observer of this index in the contract estimated in the last [`Agent::sense`]: current in A, voltage and bias in V.
+    pub(crate) fn estimates(&self, observer: usize) -> [f64; 3] {
+        let [current, voltage, bias, _] = self.trace.estimates[observer];
+        [current, voltage, bias].map(T::to_f64)
+    }
+
+    /// The signal of this index in the contract, as the last [`Agent::sense`] took it.
+    pub(crate) fn signal(&self, index: usize) -> f64 {
+        self.trace.signals[index].to_f64()
+    }
+
     pub(crate) fn inputs_mut(&mut self) -> &mut Inputs {
         &mut self.inputs
     }

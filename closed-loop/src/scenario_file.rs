@@ -27,6 +27,8 @@ pub struct Scenario {
     pub task: Task,
     /// Classical controllers that run beside the policy.
     pub baselines: Vec<Kind>,
+    /// Observers of the policy behind which they stand, by name; none where they see what the sensors show.
+    pub observers: Vec<String>,
     /// Duties that the limits may use, one limit each.
     pub limits: Vec<[f64; 2]>,
 }
@@ -110,6 +112,7 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<S
         default_steps,
         task,
         baselines: root.with_default("baselines", Kind::ALL.to_vec(), faults, baselines),
+        observers: root.with_default("observer", Vec::new(), faults, observers),
         limits: root.with_default("limit", vec![[0.0, 1.0]], faults, limits),
     })
 }
@@ -242,6 +245,16 @@ fn baselines(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<Kind>> {
     kinds.sort();
     kinds.dedup();
     Some(kinds)
+}
+
+/// A name, or several of them.
+fn observers(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<String>> {
+    if value.as_list().is_none() {
+        return value.text(faults).map(|name| vec![name.to_owned()]);
+    }
+    value.each("names of observers: [\"slow\", \"fast\"]", faults, |item, faults| {
+        item.text(faults).map(str::to_owned)
+    })
 }
 
 /// `false`, the duties the limit may use, or several of them.

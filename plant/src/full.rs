@@ -16,9 +16,10 @@
 //! A part of this picture that a converter does not have keeps its state where it was, with slope 0. So do the low-passes of the
 //! sensors, which nothing here depends on: [`lag`] moves them on behind each step.
 
+mod algebra;
+
 use serde::{Deserialize, Serialize};
 
-use crate::effects::{dcr, derating, input_ripple, saturation};
 use crate::lag;
 use crate::parameters::Parameters;
 use crate::plain::Track;
@@ -37,8 +38,9 @@ const V_CIN: usize = 5;
 const I_SOURCE: usize = 6;
 const SHOWN: usize = 7;
 
-/// What changes by the circuit's equations: all but the low-passes.
-type Slopes = [f64; SHOWN];
+/// States of a circuit with inductor and output capacitor alone. Loops over the others, which stand still there, and the branches
+/// for parts that are not there took more than half of the time of a converter with an ESR.
+const FEW: usize = V_C + 1;
 
 /// The states: inductance current, capacitor voltage, cable, load, source, four low-passes.
 pub(crate) type States = [f64; STATES];
@@ -72,6 +74,8 @@ pub(crate) struct Full {
     has_cable: bool,
     has_c_in: bool,
     has_lag: bool,
+    /// A state beyond [`FEW`] changes.
+    has_many: bool,
     /// 1 / L, 1 / C of parts that change with neither current nor voltage.
     linear: [Option<f64>; 2],
     low_pass: [f64; 4],
@@ -79,13 +83,13 @@ pub(crate) struct Full {
     rate: f64,
 }
 
-/// What follows from the states at once.
-#[derive(Debug, Clone, Copy, Default)]
-struct Algebra {
+/// What follows from the states at once; the slopes are those of the first `N` states.
+#[derive(Debug, Clone, Copy)]
+struct Algebra<const N: usize> {
     signals: Signals,
     v_l: f64,
     v_source: f64,
-    slopes: Slopes,
+    slopes: [f64; N],
 }
 
 impl Full {
@@ -96,12 +100,14 @@ impl Full {
             (p.inductor.saturation == 0.0).then(|| 1.0 / p.converter.inductance),
             (p.capacitor.derating == 0.0).then(|| 1.0 / p.converter.capacitance),
         ];
+        let (has_cable, has_lag) = (p.cable.inductance > 0.0, p.load.cpl_time_constant > 0.0);
         Full {
             p: p.clone(),
             linear,
-            has_cable: p.cable.inductance > 0.0,
+            has_cable,
             has_c_in: has_c_in(p),
-            has_lag: p.load.cpl_time_constant > 0.0,
+            has_lag,
+            has_many: has_cable || has_lag || has_c_in(p),
             low_pass,
             rate: rate::fastest(p).1,
         }
@@ -141,39 +147,58 @@ impl Full {
 
     /// The signals at one instant.
     pub fn signals(&self, x: &States, path: &Path, load: &Load, t: f64) -> Signals {
-        self.algebra(x, path, load, t).signals
+        match self.has_many {
+            true => self.algebra(&first::<SHOWN>(x), path, load, t).signals,
+            false => self.algebra(&first::<FEW>(x), path, load, t).signals,
+        }
     }
 
     /// Advances by `h` seconds from time `t`, or until the current reaches 0 if the path stops there, or an open leg
     /// begins to conduct. Returns the time used.
     pub fn advance(&self, x: &mut States, path: &Path, load: &Load, span: (f64, f64), track: &mut Track) -> f64 {
+        match self.has_many {
+            true => self.advance_first::<SHOWN>(x, path, load, span, track),
+            false => self.advance_first::<FEW>(x, path, load, span, track),
+        }
+    }
+
+    /// [`Full::advance`] where the states behind the first `N` stand still.
+    fn advance_first<const N: usize>(
+        &self,
+        states: &mut States,
+        path: &Path,
+        load: &Load,
+        span: (f64, f64),
+        track: &mut Track,
+    ) -> f64 {
         let (t, h) = span;
+        let mut x = first::<N>(states);
         // a load step changes this rate, so it is not part of `rate`
         let far = rate::of_load(&self.p, load);
         // at least one step: an interval of length 0 would be 0 / 0
         let count = (h * self.rate.max(far)).ceil().max(1.0);
         let step = h / count;
         let whole = lag::of_sensors(step, &self.low_pass);
-        let mut before = self.algebra(x, path, load, t);
+        let mut before = self.algebra(&x, path, load, t);
         extend(track, &before.signals, path);
         let mut used = 0.0;
         for _ in 0..count as u64 {
-            let start = *x;
-            *x = self.step(&start, &before, path, load, t + used, step);
-            let mut after = self.algebra(x, path, load, t + used + step);
+            let start = x;
+            x = self.step(&start, &before, path, load, t + used, step);
+            let mut after = self.algebra(&x, path, load, t + used + step);
             let mut length = step;
             let crossed = path.only != 0.0 && left(&after, path) <= 0.0;
             // the diode has no current to begin with: no time is used, and the caller goes on with an open leg
             if crossed && left(&before, path) <= 0.0 {
                 length = 0.0;
-                *x = start;
+                x = start;
                 after = before;
             } else if crossed {
                 length = self.crossing(&start, &before, path, load, (t + used, step), left(&after, path));
-                *x = self.step(&start, &before, path, load, t + used, length);
-                after = self.algebra(x, path, load, t + used + length);
+                x = self.step(&start, &before, path, load, t + used, length);
+                after = self.algebra(&x, path, load, t + used + length);
             }
-            let middle = between(&start, x, &before.slopes, &after.slopes, length);
+            let middle = between(&start, &x, &before.slopes, &after.slopes, length);
             let mid = self.algebra(&middle, path, load, t + used + 0.5 * length).signals;
             if let Some(v) = vertex(before.signals.v_out, mid.v_out, after.signals.v_out) {
                 track.voltage(v);
@@ -182,7 +207,7 @@ impl Full {
                 // a crossing has shortened the step
                 let cut = (length != step).then(|| lag::of_sensors(length, &self.low_pass));
                 let shown = [&before.signals, &mid, &after.signals];
-                lag::follow(&mut x[SHOWN..], cut.as_ref().unwrap_or(&whole), shown);
+                lag::follow(&mut states[SHOWN..], cut.as_ref().unwrap_or(&whole), shown);
             }
             used += length;
             if crossed {
@@ -191,6 +216,7 @@ impl Full {
                 x[I_L] = 0.0;
             }
             extend(track, &after.signals, path);
+            states[..N].copy_from_slice(&x);
             if crossed {
                 return used.min(h);
             }
@@ -200,7 +226,15 @@ impl Full {
     }
 
     /// When nothing is `left` of what keeps the path, by the Illinois method.
-    fn crossing(&self, x: &States, a: &Algebra, path: &Path, load: &Load, span: (f64, f64), end: f64) -> f64 {
+    fn crossing<const N: usize>(
+        &self,
+        x: &[f64; N],
+        a: &Algebra<N>,
+        path: &Path,
+        load: &Load,
+        span: (f64, f64),
+        end: f64,
+    ) -> f64 {
         let (t, h) = span;
         let (mut low, mut high) = ((0.0, left(a, path)), (h, end));
         // a bound alone: the tests take 8 turns at most, and as many halvings end at 1e-12 of the step
@@ -227,7 +261,15 @@ impl Full {
         high.0
     }
 
-    fn step(&self, x: &States, first: &Algebra, path: &Path, load: &Load, t: f64, h: f64) -> States {
+    fn step<const N: usize>(
+        &self,
+        x: &[f64; N],
+        first: &Algebra<N>,
+        path: &Path,
+        load: &Load,
+        t: f64,
+        h: f64,
+    ) -> [f64; N] {
         // the slopes at the start are known from the step before: three evaluations instead of four
         let k1 = &first.slopes;
         let k2 = self.algebra(&moved(x, k1, 0.5 * h), path, load, t + 0.5 * h).slopes;
@@ -235,200 +277,36 @@ impl Full {
         let k4 = self.algebra(&moved(x, &k3, h), path, load, t + h).slopes;
         let mut end = *x;
         let sixth = h / 6.0;
-        for n in 0..SHOWN {
+        for n in 0..N {
             end[n] += sixth * (k1[n] + 2.0 * (k2[n] + k3[n]) + k4[n]);
         }
         end
-    }
-
-    fn constant_power(&self, load: &Load, v: f64) -> f64 {
-        // continuous at the fold: P / v_fold on both sides
-        let fold = self.p.load.v_fold;
-        if v >= fold {
-            load.power / v
-        } else {
-            load.power * v / (fold * fold)
-        }
-    }
-
-    /// The source as the switch sees it: voltage and resistance.
-    fn thevenin(&self, x: &States, v_source: f64) -> (f64, f64) {
-        let s = &self.p.source;
-        if !self.has_c_in {
-            // without capacitor the source's resistance is in series with the switch, while that conducts
-            return (v_source, s.resistance);
-        }
-        if s.inductance > 0.0 {
-            return (x[V_CIN] + s.esr_in * x[I_SOURCE], s.esr_in);
-        }
-        let r = s.resistance + s.esr_in;
-        (
-            (v_source * s.esr_in + x[V_CIN] * s.resistance) / r,
-            s.resistance * s.esr_in / r,
-        )
-    }
-
-    fn algebra(&self, x: &States, path: &Path, load: &Load, t: f64) -> Algebra {
-        let p = &self.p;
-        // divisions are what a step costs most: none for a part that does not change, nor for one that is not there
-        let per_l = self.linear[0]
-            .unwrap_or_else(|| 1.0 / (p.converter.inductance * saturation::relative_inductance(&p.inductor, x[I_L])));
-        let v_source = p.converter.v_in + input_ripple::voltage(&p.source, t);
-        let (v_th, r_th) = self.thevenin(x, v_source);
-        let r = path.r + path.share * r_th + dcr::in_series(&p.inductor) + self.apart(path, load);
-        let core = p.inductor.core_conductance;
-        // v_l = (drive - give v_out) / (1 + r core), i_b = i_l + core v_l; nothing of it while no current flows
-        let i_l = if path.open { 0.0 } else { x[I_L] };
-        let drive = path.share * v_th + path.emf - r * i_l;
-        let shrunk = if core == 0.0 { 1.0 } else { 1.0 / (1.0 + r * core) };
-        let reflected = match path.open {
-            true => 0.0,
-            false => path.give * (p.capacitor.esr * core + p.capacitor.esl * per_l) * shrunk,
-        };
-        let (v_out, i_out) = self.output(x, load, path.give, i_l, (reflected, drive));
-        let v_l = if path.open {
-            0.0
-        } else {
-            (drive - path.give * v_out) * shrunk
-        };
-        let i_b = i_l + core * v_l;
-        let v_in = v_th - path.share * r_th * i_b;
-        let signals = Signals {
-            v_out,
-            i_l: i_b,
-            i_out,
-            v_in,
-        };
-        let mut algebra = Algebra {
-            signals,
-            v_l,
-            v_source,
-            slopes: [0.0; SHOWN],
-        };
-        self.slopes(x, path, load, per_l, &mut algebra);
-        algebra
-    }
-
-    /// What the averaged model adds to the resistance: the output stands against the inductor while it receives the
-    /// current, and then lies above its mean by the ESR's share of that current.
-    fn apart(&self, path: &Path, load: &Load) -> f64 {
-        // 0 in every state of the leg, where `give` is 0 or 1
-        if path.give == 0.0 || path.give == 1.0 {
-            return 0.0;
-        }
-        let esr = self.p.capacitor.esr;
-        let g = if self.has_cable { 0.0 } else { load.conductance };
-        path.give * (1.0 - path.give) * esr / (1.0 + esr * g)
-    }
-
-    /// Output voltage and current from
-    /// `v (1 + give reflected) + esr i_out(v) = v_c + esr give i_l + reflected drive - esl di_out/dt`.
-    fn output(&self, x: &States, load: &Load, give: f64, i_l: f64, (reflected, drive): (f64, f64)) -> (f64, f64) {
-        let c = &self.p.capacitor;
-        let mut slope = 1.0 + give * reflected;
-        let mut right = x[V_C] + c.esr * (give * i_l) + reflected * drive;
-        if self.has_cable {
-            let cable = &self.p.cable;
-            let divided = c.esl / cable.inductance;
-            slope += divided;
-            right += divided * (x[V_LOAD] + cable.resistance * x[I_CABLE]) - c.esr * x[I_CABLE];
-            // the cable's current is a state: constant power acts behind it and needs no equation here
-            return (right / slope, x[I_CABLE]);
-        }
-        let fixed = load.current + if self.has_lag { x[I_CPL] } else { 0.0 };
-        slope += c.esr * load.conductance;
-        right -= c.esr * fixed;
-        let mut v = if slope == 1.0 { right } else { right / slope };
-        if self.has_lag || load.power == 0.0 {
-            return (v, load.conductance * v + fixed);
-        }
-        // above the fold it is the larger solution of slope v^2 - right v + esr P = 0
-        let square = right * right - 4.0 * slope * c.esr * load.power;
-        let above = if square > 0.0 {
-            (right + square.sqrt()) / (2.0 * slope)
-        } else {
-            0.0
-        };
-        // without ESR the voltage is that of the capacitor, whatever the load draws
-        if c.esr > 0.0 && above >= self.p.load.v_fold {
-            v = above;
-        } else if c.esr > 0.0 {
-            // Newton's error squares: behind the fourth turn less than 2e-16 of v is left in the tests
-            for _ in 0..4 {
-                let cpl = self.constant_power(load, v);
-                let turn = if v >= self.p.load.v_fold {
-                    -cpl / v
-                } else {
-                    // P / v_fold^2, and not 0 / 0 at a voltage of 0
-                    cpl / v.max(1e-300)
-                };
-                // constant power is a negative resistance: near the fold it may turn Newton's step round
-                v -= (slope * v + c.esr * cpl - right) / (slope + c.esr * turn).max(0.1 * slope);
-            }
-        }
-        (v, load.conductance * v + fixed + self.constant_power(load, v))
-    }
-
-    fn slopes(&self, x: &States, path: &Path, load: &Load, per_l: f64, a: &mut Algebra) {
-        let (p, s) = (&self.p, a.signals);
-        let per_c = self.linear[1]
-            .unwrap_or_else(|| 1.0 / (p.converter.capacitance * derating::relative_capacitance(&p.capacitor, x[V_C])));
-        a.slopes[I_L] = a.v_l * per_l;
-        a.slopes[V_C] = (path.give * s.i_l - s.i_out) * per_c;
-        let mut v_load = s.v_out;
-        if self.has_cable {
-            v_load = x[V_LOAD];
-            let cpl = if self.has_lag {
-                x[I_CPL]
-            } else {
-                self.constant_power(load, v_load)
-            };
-            let drawn = load.conductance * v_load + load.current + cpl;
-            a.slopes[I_CABLE] = (s.v_out - p.cable.resistance * x[I_CABLE] - v_load) / p.cable.inductance;
-            a.slopes[V_LOAD] = (x[I_CABLE] - drawn) / p.cable.capacitance;
-        }
-        if self.has_lag {
-            a.slopes[I_CPL] = (self.constant_power(load, v_load) - x[I_CPL]) / p.load.cpl_time_constant;
-        }
-        if self.has_c_in {
-            let source = &p.source;
-            let i_source = match source.inductance > 0.0 {
-                true => x[I_SOURCE],
-                false => (a.v_source - s.v_in) / source.resistance,
-            };
-            a.slopes[V_CIN] = (i_source - path.share * s.i_l) / source.c_in;
-            if source.inductance > 0.0 {
-                a.slopes[I_SOURCE] = (a.v_source - source.resistance * i_source - s.v_in) / source.inductance;
-            }
-        }
     }
 }
 
 /// What keeps a path that ends by itself, and is 0 when it does: the current of a diode; of an open leg the voltage that the
 /// diode blocks.
-fn left(a: &Algebra, path: &Path) -> f64 {
+fn left<const N: usize>(a: &Algebra<N>, path: &Path) -> f64 {
     match path.open {
         true => a.signals.v_out - (a.signals.v_in + path.emf),
         false => a.signals.i_l * path.only,
     }
 }
 
+/// The states that change.
 #[inline(always)]
-fn moved(x: &States, slopes: &Slopes, h: f64) -> States {
-    let mut end = *x;
-    for n in 0..SHOWN {
-        end[n] += h * slopes[n];
-    }
-    end
+fn first<const N: usize>(x: &States) -> [f64; N] {
+    std::array::from_fn(|n| x[n])
+}
+
+#[inline(always)]
+fn moved<const N: usize>(x: &[f64; N], slopes: &[f64; N], h: f64) -> [f64; N] {
+    std::array::from_fn(|n| x[n] + h * slopes[n])
 }
 
 /// The cubic through both ends and slopes, at half way.
-fn between(x0: &States, x1: &States, k0: &Slopes, k1: &Slopes, h: f64) -> States {
-    let mut middle = *x0;
-    for n in 0..SHOWN {
-        middle[n] = 0.5 * (x0[n] + x1[n]) + h / 8.0 * (k0[n] - k1[n]);
-    }
-    middle
+fn between<const N: usize>(x0: &[f64; N], x1: &[f64; N], k0: &[f64; N], k1: &[f64; N], h: f64) -> [f64; N] {
+    std::array::from_fn(|n| 0.5 * (x0[n] + x1[n]) + h / 8.0 * (k0[n] - k1[n]))
 }
 
 fn extend(track: &mut Track, signals: &Signals, path: &Path) {

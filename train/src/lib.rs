@@ -24,12 +24,14 @@ pub mod outcome;
 pub mod page;
 mod progress;
 pub mod replay;
+mod rest_page;
 mod resume;
 pub mod score;
 pub mod seeds;
 pub mod settings;
 pub mod start;
 pub mod summary;
+pub mod tensorboard;
 pub mod trainer;
 
 pub use closed_loop::scenario::Metrics;

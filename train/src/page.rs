@@ -1,11 +1,12 @@
 //! `report.html` of a training: all seeds, the specification, and what the best policy decides.
 
-use closed_loop::{decision_map, digits, time_digits};
+use closed_loop::{Converter, decision_map, digits, time_digits};
 use policy::Policy;
 use report::{Axis, Chart, HeatMap, Page, Panel, Ramp, Section, Series, Svg, Table, Verdict, grouped};
 
 use crate::faults::Error;
 use crate::outcome::Outcome;
+use crate::rest_page::around_rest;
 use crate::score::{Scoring, figures};
 use crate::seeds::SeedRun;
 use crate::settings::{Instants, Requirement, Settings};
@@ -17,11 +18,11 @@ const CELLS: usize = 60;
 /// How far the map reaches around the wanted voltage, as a share of it; there a policy decides, and beyond it commands its ends.
 const AROUND: f64 = 0.1;
 
-/// The page; `best` is the outcome of one of the `runs`.
+/// The page; `best` is the outcome of one of the `runs`, `converter` what they were trained at.
 ///
 /// # Errors
-/// If a table does not fit its columns, which would be a fault of this crate.
-pub fn page(settings: &Settings, runs: &[SeedRun], best: &Outcome) -> Result<String, Error> {
+/// If the policy does not run at the converter, or a table does not fit its columns, which would be a fault of this crate.
+pub fn page(settings: &Settings, runs: &[SeedRun], best: &Outcome, converter: &Converter) -> Result<String, Error> {
     let verdict = match (settings.specification.is_empty(), best.evaluated.met) {
         (true, _) => Verdict::Note,
         (false, true) => Verdict::Pass,
@@ -39,6 +40,7 @@ pub fn page(settings: &Settings, runs: &[SeedRun], best: &Outcome) -> Result<Str
         Some(svg) => decided.chart_or_reason(svg, caption),
         None => decided.text("A policy of one signal has no map."),
     };
+    decided = around_rest(decided, settings, best, converter)?;
     let report = best
         .files
         .get("report.txt")

@@ -292,6 +292,13 @@ pub struct Simulate {
     /// Given twice, every value meets every other, and the page has a map. N is 5 unless given
     #[arg(long, value_name = "KEY=LOW,HIGH[,N]")]
     pub spread: Vec<String>,
+    /// Draw this many converters from between the ends of every --spread, of which there may be any number then, and compare the
+    /// controllers by median and worst
+    #[arg(long, value_name = "N", requires_all = ["spread", "spread_seed"])]
+    pub spread_draws: Option<usize>,
+    /// Seed of the draws: the same seed, the same converters
+    #[arg(long, value_name = "SEED", requires = "spread_draws")]
+    pub spread_seed: Option<u64>,
     /// Folder for metrics, trajectories and pictures; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -330,6 +337,9 @@ pub struct Train {
     /// Cores used at most; all unless given
     #[arg(long, default_value_t = 0, hide_default_value = true, value_name = "N")]
     pub threads: usize,
+    /// Folder for event files of TensorBoard, one folder in it for each seed; written while the training runs
+    #[arg(long, value_name = "DIR")]
+    pub tensorboard: Option<PathBuf>,
     /// Go on from the checkpoints that an interrupted training left in DIR, bit for bit
     #[arg(long)]
     pub resume: bool,

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use closed_loop::Scenario;
-use closed_loop::simulation::{Findings, PAGE, Setting, Spread, simulate};
+use closed_loop::simulation::{Draws, Findings, PAGE, Setting, Spread, simulate};
 use serde::Serialize;
 use toml_input::FileName;
 
@@ -82,7 +82,8 @@ fn setting(options: &Simulate) -> Result<Setting, Failure> {
         .iter()
         .map(|text| Spread::parse(text))
         .collect::<Result<_, _>>()?;
-    let setting = setting.spread(spread)?;
+    let draws = options.spread_draws.zip(options.spread_seed);
+    let setting = setting.spread(spread, draws.map(|(count, seed)| Draws { count, seed }))?;
     Ok(match &options.designed_on {
         None => setting,
         Some(file) => setting.designed_on(file)?,

@@ -13,6 +13,7 @@
 mod cascade;
 mod deadbeat;
 mod feed_forward;
+mod observed;
 mod pid;
 
 use std::fmt;
@@ -25,6 +26,7 @@ use crate::faults::Error;
 pub use cascade::Cascade;
 pub use deadbeat::Deadbeat;
 pub use feed_forward::FeedForward;
+pub use observed::observed;
 pub use pid::Pid;
 
 /// Which classical controller.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::findings::{Findings, Step};
+use super::spread::{Json as SpreadJson, Spreads};
 use super::{page, pictures, words};
 use crate::faults::{Error, told};
 use crate::limit::Bound;
@@ -24,6 +25,8 @@ struct Json<'a> {
     load_steps: Vec<JsonStep<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     check: Option<JsonCheck<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    spread: Option<SpreadJson<'a>>,
     notes: &'a [String],
 }
 
@@ -85,18 +88,18 @@ impl Findings {
         files.insert("metrics.csv".to_owned(), metrics.finish());
         files.insert("metrics.json".to_owned(), json(self)?);
         files.insert("summary.txt".to_owned(), self.summary());
-        let mut maps = Vec::new();
+        let mut of_spread = Vec::new();
         if let Some(spread) = &self.spread {
             files.insert("spread.csv".to_owned(), spread.csv());
-            maps = spread.maps()?;
-            for (name, svg) in &maps {
+            of_spread = spread.pictures()?;
+            for (name, svg) in &of_spread {
                 files.insert(
                     format!("spread-{}.svg", name.replace(' ', "-")),
                     svg.as_str().to_owned(),
                 );
             }
         }
-        files.insert(PAGE.to_owned(), page::page(self, drawn, maps)?);
+        files.insert(PAGE.to_owned(), page::page(self, drawn, of_spread)?);
         Ok(files)
     }
 
@@ -148,7 +151,7 @@ impl Findings {
             controller,
             steps,
             check,
-            ..
+            spread,
         } = self;
         Json {
             policy: &setting.policy.name,
@@ -162,6 +165,7 @@ impl Findings {
                 periods: check.periods,
                 differences: &check.differences,
             }),
+            spread: spread.as_ref().map(Spreads::json),
             notes: &setting.notes,
         }
     }

@@ -6,7 +6,7 @@ use plant::Parameters;
 use policy::{Interval, Policy};
 use toml_input::{Fault, FileName, Message};
 
-use super::spread::{Spread, Spreads};
+use super::spread::{self, Draws, Spread, Spreads};
 use crate::agent::REFERENCE;
 use crate::converter::Converter;
 use crate::course::Course;
@@ -34,8 +34,10 @@ pub struct Setting {
     pub converter: Converter,
     /// What the classical controllers are designed on: the plant, unless told otherwise.
     pub designed_on: Parameters,
-    /// One or two numbers of the plant, on whose values all controllers are judged as well.
+    /// Numbers of the plant, on whose values all controllers are judged as well: one or two of a grid.
     pub spread: Vec<Spread>,
+    /// Whether the values are drawn.
+    pub draws: Option<Draws>,
     /// Voltage to hold, V.
     pub v_ref: f64,
     /// What the user should know of the scenario, one sentence each.
@@ -101,6 +103,7 @@ impl Setting {
             reaches(converter.parameters(), voltage, file)?;
         }
         suits(&policy, converter.parameters(), v_ref, file)?;
+        behind(&policy, &scenario.observers, file)?;
         draws(converter.parameters(), &scenario.load_steps, file)?;
         for v_in in scenario.load_steps.iter().filter_map(|step| step.source).flatten() {
             let mut other = converter.parameters().clone();
@@ -118,6 +121,7 @@ impl Setting {
             plant,
             designed_on: converter.parameters().clone(),
             spread: Vec::new(),
+            draws: None,
             converter,
             v_ref,
         })
@@ -144,20 +148,32 @@ impl Setting {
         Ok(self)
     }
 
-    /// All controllers are judged on a spread of the plant, too; the classical ones keep their design.
+    /// All controllers are judged on a spread of the plant, too, on every value or on drawn ones; the classical ones keep their
+    /// design.
     ///
     /// # Errors
-    /// If there are more than two numbers, or one twice.
-    pub fn spread(mut self, spread: Vec<Spread>) -> Result<Self, Error> {
-        let twice = matches!(spread.as_slice(), [a, b] if a.key == b.key);
-        if spread.len() > 2 || twice {
-            let keys: Vec<&str> = spread.iter().map(|spread| spread.key.as_str()).collect();
-            let message = Message::new("a spread is of one number or of two").found(keys.join(", "));
-            return Err(message.expected("--spread once or twice, with different keys").into());
-        }
-        self.spread = spread;
+    /// If a number stands there twice, there are more than two that are not drawn, or spread and draws do not go together.
+    pub fn spread(mut self, spread: Vec<Spread>, draws: Option<Draws>) -> Result<Self, Error> {
+        spread::check(&spread, draws)?;
+        (self.spread, self.draws) = (spread, draws);
         Ok(self)
     }
+}
+
+/// # Errors
+/// If the classical controllers are to stand behind an observer that the policy does not have.
+fn behind(policy: &Policy, observers: &[String], file: &Path) -> Result<(), Error> {
+    let names = || policy.observers.iter().map(|own| own.name.as_str());
+    let Some(missing) = observers.iter().find(|name| !names().any(|own| own == name.as_str())) else {
+        return Ok(());
+    };
+    let message = Message::new("the policy has no observer of this name").found(missing.clone());
+    let known: Vec<&str> = names().collect();
+    let message = match known.as_slice() {
+        [] => message.expected("a policy with [[observer]]"),
+        known => message.expected(format!("one of {}", known.join(", "))),
+    };
+    Err(Fault::in_file(file, message.did_you_mean(missing, known)).into())
 }
 
 /// Whether a policy can be told to hold a voltage; `steps` asks for it.
@@ -207,6 +223,15 @@ fn notes(scenario: &Scenario, policy: &Policy, converter: &Converter, v_ref: f64
              reference; no limit is computed for it, and the classical controllers, which hold one voltage, are left out",
             step.values[0],
             step.kind.unit()
+        ));
+    }
+    if !scenario.observers.is_empty() && !scenario.baselines.is_empty() {
+        notes.push(format!(
+            "the classical controllers stand behind {} of the policy's contract: they see its estimates, and its bias is made up for",
+            match scenario.observers.as_slice() {
+                [one] => format!("the observer `{one}`"),
+                several => format!("the observers {}, each behind each", several.join(", ")),
+            }
         ));
     }
     let left_out = left_out(converter.parameters());

@@ -17,5 +17,5 @@ mod words;
 pub use files::PAGE;
 pub use findings::{Check, Findings, POLICY, Setting, Step};
 pub use runs::simulate;
-pub use spread::{Cell, Spread, Spreads};
+pub use spread::{Cell, Draws, Spread, Spreads};
 pub use words::band_text;

@@ -8,8 +8,8 @@ use crate::faults::{Error, told};
 use crate::scenario::Metrics;
 use crate::tables::{AT_REST, COLUMNS, cells, digits, limit_cells, rest_cells, time_digits};
 
-/// One HTML file; `drawn` are the pictures of the load steps in their order, `maps` those of the spread.
-pub(super) fn page(found: &Findings, drawn: Vec<Svg>, maps: Vec<(String, Svg)>) -> Result<String, Error> {
+/// One HTML file; `drawn` are the pictures of the load steps in their order, `of_spread` those of the spread.
+pub(super) fn page(found: &Findings, drawn: Vec<Svg>, of_spread: Vec<(String, Svg)>) -> Result<String, Error> {
     let setting = &found.setting;
     let (verdict, sentence) = verdict(found);
     let setup = [
@@ -30,7 +30,7 @@ pub(super) fn page(found: &Findings, drawn: Vec<Svg>, maps: Vec<(String, Svg)>) 
     });
     page = page.section(Section::new("Load steps").pick("load step", steps.collect()));
     if let Some(spread) = &found.spread {
-        page = page.section(spread.section(maps));
+        page = page.section(spread.section(of_spread));
     }
     page.html().map_err(told)
 }

@@ -6,7 +6,7 @@ use toml_input::{Fault, Message};
 use super::findings::{Check, Findings, LAW, POLICY, Setting, Step};
 use super::spread;
 use crate::agent::Agent;
-use crate::baselines::Baseline;
+use crate::baselines::{Baseline, Kind, observed};
 use crate::beyond::beyond;
 use crate::controller::{Classical, Controller, Trajectory, follow};
 use crate::course::{Course, Named, Tell};
@@ -45,7 +45,7 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
         periods: 0,
         differences: Vec::new(),
     });
-    let mut beside = law(&setting)?.into_iter().collect::<Vec<_>>();
+    let mut beside: Vec<Beside> = law(&setting)?.into_iter().collect();
     beside.extend(classical(&mut setting));
     let load_steps = setting.scenario.load_steps.clone();
     let mut progress = Progress {
@@ -79,7 +79,7 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
     }
     let mut all: Vec<(&str, &mut Box<dyn Controller>)> = Vec::new();
     all.extend(named.first_mut().map(|first| (POLICY, &mut first.controller)));
-    all.extend(beside.iter_mut().map(|(name, controller)| (*name, controller)));
+    all.extend(beside.iter_mut().map(|(name, controller)| (name.as_str(), controller)));
     let spread = spread::run(&setting, &mut all, &mut |what| (progress.tell)(&format_args!("{what}")))?;
     Ok(Findings {
         spread,
@@ -101,13 +101,44 @@ fn classical(setting: &mut Setting) -> Vec<Beside> {
     let loads = setting.scenario.load_steps.iter().flat_map(LoadStep::loads);
     let i_out = loads.map(|load| load.at(v_ref)).fold(0.0, f64::max);
     let mut found: Vec<Beside> = Vec::new();
-    for kind in &setting.scenario.baselines {
-        match Baseline::new(*kind, &setting.designed_on, v_ref, i_out) {
-            Ok(design) => found.push((kind.name(), Box::new(Classical::from(design)))),
-            Err(error) => setting.notes.extend(error.iter().map(reason)),
+    for kind in setting.scenario.baselines.clone() {
+        for observer in places(setting) {
+            match one(setting, kind, observer, (v_ref, i_out)) {
+                Ok(own) => found.push(own),
+                // the same reason behind each observer
+                Err(error) => {
+                    let reasons = error.iter().map(reason).filter(|said| !setting.notes.contains(said));
+                    setting.notes.extend(reasons.collect::<Vec<_>>());
+                }
+            }
         }
     }
     found
+}
+
+/// Where a classical controller stands: behind each observer of the scenario, by index into the contract, or at the sensors.
+fn places(setting: &Setting) -> Vec<Option<usize>> {
+    let index = |name: &String| setting.policy.observers.iter().position(|own| own.name == *name);
+    match setting.scenario.observers.as_slice() {
+        [] => vec![None],
+        names => names.iter().map(index).collect(),
+    }
+}
+
+fn one(setting: &Setting, kind: Kind, observer: Option<usize>, wanted: (f64, f64)) -> Result<Beside, Error> {
+    let (v_ref, i_out) = wanted;
+    let Some(observer) = observer else {
+        let design = Baseline::new(kind, &setting.designed_on, v_ref, i_out)?;
+        return Ok((kind.name().to_owned(), Box::new(Classical::from(design))));
+    };
+    let name = match setting.scenario.observers.len() {
+        0 | 1 => kind.name().to_owned(),
+        _ => format!("{kind} {}", setting.policy.observers[observer].name),
+    };
+    Ok((
+        name,
+        observed(&setting.policy, observer, kind, &setting.designed_on, wanted)?,
+    ))
 }
 
 fn reason(fault: &Fault) -> String {
@@ -118,7 +149,7 @@ fn reason(fault: &Fault) -> String {
 }
 
 /// What stands beside the policy in every table.
-type Beside = (&'static str, Box<dyn Controller>);
+type Beside = (String, Box<dyn Controller>);
 
 /// The law that a policy adds to, on its own: what the network gains is the difference to it.
 fn law(setting: &Setting) -> Result<Option<Beside>, Error> {
@@ -129,7 +160,7 @@ fn law(setting: &Setting) -> Result<Option<Beside>, Error> {
         Scalar::F32 => Box::new(Agent::<f32>::told(&law)?),
         Scalar::F64 => Box::new(Agent::<f64>::told(&law)?),
     };
-    Ok(Some((LAW, controller)))
+    Ok(Some((LAW.to_owned(), controller)))
 }
 
 fn run(

@@ -21,9 +21,11 @@ use report::grouped;
 
 mod kept;
 mod progress;
+mod tensorboard;
 
 use kept::Kept;
 use progress::Watcher;
+use tensorboard::Events;
 
 /// Time between two checkpoints on the way. A kill or a power cut may cost five seconds of work; the rest is for a look at
 /// the selection scenarios and for writing.
@@ -59,9 +61,13 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
         checkpoints: kept.prepare(&settings.seeds, options.resume)?,
         checkpoint_every: Some(CHECKPOINT_EVERY),
     };
+    let events = options.tensorboard.as_deref();
+    let events = events
+        .map(|folder| Events::new(folder, &settings.seeds, options.resume))
+        .transpose()?;
     let stop = interruption::stop_on_signal();
     let start = Instant::now();
-    let watcher = Watcher::new(&settings, &kept, &stop);
+    let watcher = Watcher::new(&settings, &kept, events.as_ref(), &stop);
     let result = train_all(&settings, &contract, &converter, &course, &stop, &watcher);
     watcher.finish()?;
     let runs = result?;
@@ -71,9 +77,12 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     let Some(best) = seeds::best(&runs) else {
         return Err(Message::new("no seed was trained").into());
     };
-    write(options, &settings, &runs, best)?;
+    write(options, &settings, &runs, best, &converter)?;
     kept.remove();
-    report(options, &settings, &runs, best, start.elapsed())
+    let outcome = report(options, &settings, &runs, best, start.elapsed())?;
+    // behind the answer: the policy is there all the same
+    events.map_or(Ok(()), |events| events.failure())?;
+    Ok(outcome)
 }
 
 /// Whether a training of these seeds may go to `out`.
@@ -96,7 +105,13 @@ pub fn check(options: &Train) -> Result<(), Failure> {
 }
 
 /// Writes the seeds' folders, the best one's last: a folder with a `policy.toml` is a whole training.
-fn write(options: &Train, settings: &Settings, runs: &[SeedRun], best: &Trained) -> Result<(), Failure> {
+fn write(
+    options: &Train,
+    settings: &Settings,
+    runs: &[SeedRun],
+    best: &Trained,
+    converter: &Converter,
+) -> Result<(), Failure> {
     let out = &options.out;
     for outcome in runs.iter().filter_map(|run| run.outcome.as_ref()) {
         output::write_all(&out.join(SEEDS).join(outcome.seed.to_string()), &outcome.files)?;
@@ -108,7 +123,11 @@ fn write(options: &Train, settings: &Settings, runs: &[SeedRun], best: &Trained)
         ("contract", settings.contract.display().to_string()),
         ("plant", settings.plant.display().to_string()),
     ];
-    let page = made::signed_page(&page::page(settings, runs, best)?, &[("--out", "policy")], &read)?;
+    let page = made::signed_page(
+        &page::page(settings, runs, best, converter)?,
+        &[("--out", "policy")],
+        &read,
+    )?;
     files.insert(PAGE.to_owned(), page.into_bytes());
     output::write_all(out, &files)
 }
@@ -167,6 +186,9 @@ fn interrupted(
     if !options.seeds.is_empty() {
         let seeds: Vec<String> = options.seeds.iter().map(u64::to_string).collect();
         resume.push_str(&format!(" --seeds {}", seeds.join(",")));
+    }
+    if let Some(folder) = &options.tensorboard {
+        resume.push_str(&format!(" --tensorboard {}", folder.display()));
     }
     resume.push_str(" --resume");
     if options.json {

@@ -10,6 +10,7 @@ use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressStyle};
 use train::{Progress, SeedRun, Settings, Watch};
 
 use super::kept::Kept;
+use super::tensorboard::Events;
 use crate::failure::Failure;
 use crate::talk;
 use report::grouped;
@@ -20,6 +21,7 @@ const LOG_EVERY: Duration = Duration::from_secs(5);
 /// Shows progress and keeps checkpoints.
 pub struct Watcher<'a> {
     kept: &'a Kept,
+    events: Option<&'a Events>,
     stop: &'a AtomicBool,
     steps: u64,
     view: Mutex<View>,
@@ -33,7 +35,7 @@ enum View {
 }
 
 impl<'a> Watcher<'a> {
-    pub fn new(settings: &Settings, kept: &'a Kept, stop: &'a AtomicBool) -> Self {
+    pub fn new(settings: &Settings, kept: &'a Kept, events: Option<&'a Events>, stop: &'a AtomicBool) -> Self {
         let view = if talk::is_quiet() {
             View::Nothing
         } else if std::io::stderr().is_terminal() && !talk::is_verbose() {
@@ -43,6 +45,7 @@ impl<'a> Watcher<'a> {
         };
         Self {
             kept,
+            events,
             stop,
             steps: settings.steps,
             view: Mutex::new(view),
@@ -66,6 +69,9 @@ impl<'a> Watcher<'a> {
 
 impl Watch for Watcher<'_> {
     fn look(&self, progress: &Progress) {
+        if let Some(events) = self.events {
+            events.look(progress);
+        }
         let Ok(mut view) = self.view.lock() else { return };
         let Progress { seed, look, .. } = *progress;
         match &mut *view {
@@ -99,6 +105,9 @@ impl Watch for Watcher<'_> {
     }
 
     fn ended(&self, seed: u64, run: &SeedRun) {
+        if let Some(events) = self.events {
+            events.ended(seed, run);
+        }
         let Ok(mut view) = self.view.lock() else { return };
         let line = format!("seed {seed} {} after {} control periods", run.ended, grouped(run.steps));
         match &mut *view {

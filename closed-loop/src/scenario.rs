@@ -207,6 +207,14 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
         }
     }
 
+    /// Whether the converter is still one.
+    ///
+    /// # Errors
+    /// Why it is not.
+    pub fn check(&self) -> Result<(), Error> {
+        self.environment.failure().map_or(Ok(()), Err)
+    }
+
     /// One control period; returns the voltage error behind it.
     fn period(&mut self, change: Option<(f64, Load)>) -> (f64, f64) {
         let duty = (self.controller)(&self.sample);
@@ -338,7 +346,7 @@ impl Task {
 /// Runs one load step at one instant from a fresh start and records every period; time 0 is the step.
 ///
 /// # Errors
-/// If the converter cannot be started.
+/// If the converter cannot be started, or one from outside fails.
 pub fn load_step<E, C>(
     environment: E,
     controller: C,
@@ -369,6 +377,7 @@ where
     run.last_before(to, phase, task.tail, |record| records.push(record));
     run.disturb(&step)?;
     let metrics = run.measure(to, phase, task.after, task.tail, |record| records.push(record));
+    run.check()?;
     let zero = lead as f64 + phase;
     for record in &mut records {
         record.time = (record.time - zero) * t_sample;
@@ -379,7 +388,7 @@ where
 /// Runs one load step at the given instants of `task`; the lead is run once and every instant goes on from a copy.
 ///
 /// # Errors
-/// If the converter cannot be started.
+/// If the converter cannot be started, or one from outside fails.
 pub fn survey<E, C>(
     environment: &E,
     controller: &C,
@@ -414,6 +423,7 @@ where
             run.last_before(to, phase, task.tail, quiet);
             run.disturb(&step)?;
             let metrics = run.measure(to, phase, task.after, task.tail, quiet);
+            run.check()?;
             finding.add(*instant, metrics);
         }
         run.lead(1, task.tail, quiet);
@@ -424,7 +434,7 @@ where
 /// All load steps of a task.
 ///
 /// # Errors
-/// If the converter cannot be started.
+/// If the converter cannot be started, or one from outside fails.
 pub fn survey_all<E, C>(
     environment: &E,
     controller: &C,

@@ -59,7 +59,8 @@ fn for_weights(options: &New, weights: &Path) -> Result<Outcome, Failure> {
 }
 
 fn for_plant(options: &New, file: &Path, wanted: Wanted) -> Result<Outcome, Failure> {
-    let plant = Parameters::from_file(file)?;
+    // beside an FMU the nominal numbers: they are what is designed on
+    let (plant, _) = Parameters::nominal_from_file(file)?;
     let start = Start::new(&plant, file, wanted)?;
     let out = &contract(&options.out);
     let from_there = |path: &Path| -> Result<String, Failure> {

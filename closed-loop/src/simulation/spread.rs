@@ -7,7 +7,6 @@
 
 use std::fmt::Write;
 
-use plant::Parameters;
 use report::{Axis, HeatMap, Section, Svg, Table};
 use toml_input::Message;
 
@@ -15,7 +14,6 @@ use super::findings::Setting;
 use super::runs::knows;
 use crate::controller::{Controller, follow};
 use crate::converter::Converter;
-use crate::environment::varied;
 use crate::faults::{Error, told};
 use crate::read::no_number;
 use crate::scenario::{Metrics, Task};
@@ -118,14 +116,13 @@ pub(super) fn run(
                 .map(|spread| spread.key.as_str())
                 .zip(numbers.clone())
                 .collect();
-            let parameters = varied(setting.converter.parameters(), &named);
             let text = named
                 .iter()
                 .map(|(key, value)| format!("{key} = {value:.4e}"))
                 .collect::<Vec<_>>()
                 .join(", ");
             tell(&text)?;
-            cells.push(cell(setting, &parameters, numbers, controllers)?);
+            cells.push(cell(setting, &setting.converter.with(&named)?, numbers, controllers)?);
         }
     }
     Ok(Some(Spreads { of: of.clone(), cells }))
@@ -133,11 +130,10 @@ pub(super) fn run(
 
 fn cell(
     setting: &Setting,
-    parameters: &Parameters,
+    converter: &Converter,
     numbers: Vec<f64>,
     controllers: &mut [(&str, &mut Box<dyn Controller>)],
 ) -> Result<Cell, Error> {
-    let converter = Converter::new(parameters)?;
     let task = Task {
         instants: INSTANTS,
         sampling_instants: 1,
@@ -148,7 +144,7 @@ fn cell(
         let mut metrics = Metrics::default();
         for step in setting.scenario.load_steps.iter().filter(|step| knows(name, **step)) {
             for instant in task.all_instants() {
-                let trajectory = follow(&converter, controller.as_mut(), setting.v_ref, &task, *step, instant)?;
+                let trajectory = follow(converter, controller.as_mut(), setting.v_ref, &task, *step, instant)?;
                 metrics = metrics.worst(trajectory.metrics);
             }
         }

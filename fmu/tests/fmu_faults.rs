@@ -99,7 +99,7 @@ fn a_description_that_is_not_for_us_is_refused() {
         &["not for co-simulation", "model exchange", "brings its own solver"],
     );
     contains(
-        &refused(two().edit("</ModelVariables>", "")),
+        &refused(two().edit("</ModelVariables>", "</ModelVariable>")),
         &["modelDescription.xml is not sound", "byte"],
     );
     contains(&refused(two().edit("\"inductor.i\"", "\"out.v\"")), &["`out.v` twice"]);
@@ -167,12 +167,12 @@ fn names_of_the_plant_file_are_looked_up() {
         bench.refusal(&WIRES.replacen(from, to, 1))
     };
     contains(
-        &edited("\"out.v\"", "\"out.u\""),
+        &edited("\"out.v\"", "\"out_v\""),
         &[
-            "no variable `out.u`",
+            "no variable `out_v`",
             "did you mean `out.v`",
             "plant.toml:",
-            "v_out = \"out.u\"",
+            "v_out = \"out_v\"",
         ],
     );
     contains(

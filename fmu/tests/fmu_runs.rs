@@ -114,6 +114,10 @@ fn an_averaged_buck_goes_as_the_plant_does() {
                 );
                 let moved = b.iter().map(|s| (s.v_out - 100.0).abs()).fold(0.0, f64::max);
                 let distance = distance(&a, &b);
+                println!(
+                    "FMI {fmi}, to {:.0} W at {at}: {distance:.1e} V or A",
+                    100.0 * to.at(100.0)
+                );
                 assert!(
                     distance < AGREEMENT && moved > 1.0,
                     "FMI {fmi}, {to:?} at {at}: {distance:e} of {moved}"
@@ -331,5 +335,24 @@ fn cost_of_a_step() {
             run(&mut converter, from, to, 0.37, 1000);
         }
         println!("{name}: {:.2} us a period", before.elapsed().as_secs_f64() * 1e6 / 1e5);
+    }
+}
+
+/// Writes FMUs and trajectories for a comparison with FMPy by hand; `POLICYC_FMU_OUT=DIR cargo test -p policyc-fmu --test fmu_runs
+/// for_fmpy -- --ignored`.
+#[test]
+#[ignore = "writes files for another program"]
+fn files_for_fmpy() {
+    let out = std::path::PathBuf::from(std::env::var("POLICYC_FMU_OUT").unwrap());
+    for fmi in [2, 3] {
+        let draft = Draft::new(fmi);
+        std::fs::write(out.join(format!("buck{fmi}.fmu")), common::zip(&draft.members())).unwrap();
+        let (from, to) = LOADS[0];
+        let samples = run(&mut draft.build().whole(), from, to, 1.0, 300);
+        let rows = samples
+            .iter()
+            .enumerate()
+            .map(|(k, s)| format!("{k} {:?} {:?}\n", s.v_out, s.i_l));
+        std::fs::write(out.join(format!("policyc{fmi}.txt")), rows.collect::<String>()).unwrap();
     }
 }

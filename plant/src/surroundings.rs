@@ -55,12 +55,15 @@ impl Surroundings {
     /// As [`crate::Plant::new`].
     pub fn new(parameters: &Parameters) -> Result<Self, Faults> {
         check(parameters)?;
-        Ok(Self {
+        let mut own = Self {
             sensing: Sensing::new(parameters),
             queue: Queue::default(),
             memory: Memory::new(parameters.sensors.seed, [0.0; 4]),
             parameters: parameters.clone(),
-        })
+        };
+        // a plant has looked once when it has been made: the noise of both is the same from here on
+        own.show(&Signals::default());
+        Ok(own)
     }
 
     /// At a sampling instant at rest: delayed duties are those that would hold the voltage, as after [`crate::Plant::reset_at`].
@@ -124,8 +127,6 @@ mod tests {
                 _ => plant.step(0.5, &load),
             };
             if period == 0 {
-                // the plant has drawn once while it was made
-                around.show(&Signals::default());
                 around.reset_at(&sample.signals());
             }
             assert_eq!(around.show(&sample.signals()), sample.measured, "period {period}");

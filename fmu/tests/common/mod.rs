@@ -108,6 +108,10 @@ impl Draft {
             };
         }
         let outputs = [10, 11, 12];
+        if self.fmi == 3 {
+            // the standard wants the time among the variables
+            text.push_str("    <Float64 name=\"time\" valueReference=\"99\" causality=\"independent\" variability=\"continuous\"/>\n");
+        }
         text.push_str("  </ModelVariables>\n  <ModelStructure>\n");
         if self.fmi == 2 {
             let list = |tag: &str| {
@@ -118,13 +122,7 @@ impl Draft {
                 format!("    <{tag}>{all}</{tag}>\n")
             };
             text.push_str(&list("Outputs"));
-            text.push_str(&format!(
-                "    <InitialUnknowns>{}<Unknown index=\"14\"/></InitialUnknowns>\n",
-                outputs
-                    .iter()
-                    .map(|k| format!("<Unknown index=\"{}\"/>", k + 1))
-                    .collect::<String>()
-            ));
+            text.push_str(&list("InitialUnknowns"));
         } else {
             for tag in ["Output", "InitialUnknown"] {
                 outputs

@@ -187,9 +187,10 @@ int fmi2ExitInitializationMode(void *m) { return begin(m); }
 int fmi2Terminate(void *m) { return (void)m, OK; }
 int fmi2Reset(void *m) { return reset(m); }
 int fmi2GetReal(void *m, const uint32_t *r, size_t n, double *v) { return get(m, r, n, v); }
-#ifndef FAULT_NO_SET_REAL
-int fmi2SetReal(void *m, const uint32_t *r, size_t n, const double *v) { return set(m, r, n, v); }
+#ifdef FAULT_NO_SET_REAL
+#define fmi2SetReal another_name
 #endif
+int fmi2SetReal(void *m, const uint32_t *r, size_t n, const double *v) { return set(m, r, n, v); }
 int fmi2DoStep(void *m, double time, double span, int keep) { return (void)keep, step(m, time, span); }
 int fmi2GetRealStatus(void *m, int kind, double *v) { return *v = ((model *)m)->time, kind == 2 ? OK : DISCARD; }
 int fmi2SetDebugLogging(void *m, int on, size_t n, const char *const *c) { return (void)m, (void)on, (void)n, (void)c, OK; }

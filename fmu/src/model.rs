@@ -46,6 +46,27 @@ pub fn open(file: &FileName, nominal: &Parameters, tell: Option<Tell>) -> Result
     Ok(Box::new(FmuConverter::new(Arc::new(model))))
 }
 
+/// Reads archive and description of an FMU, every member of it, and runs nothing: version of FMI and number of variables.
+///
+/// # Errors
+/// As [`open`], as far as the archive and its description are concerned.
+pub fn look(file: &FileName) -> Result<(Version, usize), Error> {
+    let looked = file.read(archive::LARGEST).and_then(|bytes| {
+        let archive = Archive::new(bytes)?;
+        for name in archive.names() {
+            archive.get(name, description::LARGEST)?;
+        }
+        let told = described(&archive)?;
+        Ok((told.version, told.variables.len()))
+    });
+    looked.map_err(|message| file.fault(message).into())
+}
+
+fn described(archive: &Archive) -> Result<Description, Message> {
+    let text = archive.get("modelDescription.xml", description::LARGEST)?;
+    Description::read(&text.ok_or_else(|| Message::new("the FMU has no modelDescription.xml"))?)
+}
+
 fn model(document: &Document, nominal: &Parameters, tell: Option<Tell>, faults: &mut Sink) -> Option<Model> {
     let settings = Settings::new(document, faults)?;
     let shown = settings.name.shown.display().to_string();
@@ -58,10 +79,8 @@ fn model(document: &Document, nominal: &Parameters, tell: Option<Tell>, faults: 
     digest.update(&bytes);
     digest.update(document.source().text.as_bytes());
     let read = Archive::new(bytes).and_then(|archive| {
-        let text = archive.get("modelDescription.xml", description::LARGEST)?;
-        let text = text.ok_or_else(|| Message::new("the FMU has no modelDescription.xml"))?;
-        let binary = Description::read(&text)?;
-        Ok((archive, binary))
+        let told = described(&archive)?;
+        Ok((archive, told))
     });
     let (archive, told) = read.map_err(|message| faults.push(name.fault(message))).ok()?;
     let file = library(&archive, &told)

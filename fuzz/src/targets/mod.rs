@@ -11,6 +11,7 @@ mod policies;
 mod seeds;
 mod steps;
 mod tools;
+mod units;
 
 use crate::forms::Form;
 use crate::guard::{Limits, Reader};
@@ -41,13 +42,14 @@ impl std::fmt::Debug for Target {
 
 /// All targets but those with planted faults.
 pub fn all() -> impl Iterator<Item = &'static Target> {
-    let lists: [&'static [Target]; 6] = [
+    let lists: [&'static [Target]; 7] = [
         policies::TARGETS,
         imports::TARGETS,
         measurements::TARGETS,
         converters::TARGETS,
         tools::TARGETS,
         steps::TARGETS,
+        units::TARGETS,
     ];
     lists.into_iter().flatten()
 }

@@ -25,4 +25,4 @@ mod wiring;
 pub use converter::FmuConverter;
 pub use description::Version;
 pub use log::Tell;
-pub use model::{look, open};
+pub use model::{look, look_at_description, open};

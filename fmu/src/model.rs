@@ -62,6 +62,15 @@ pub fn look(file: &FileName) -> Result<(Version, usize), Error> {
     looked.map_err(|message| file.fault(message).into())
 }
 
+/// [`look`] at the text of a modelDescription.xml alone, called `file` in faults.
+///
+/// # Errors
+/// If it is not sound.
+pub fn look_at_description(file: &FileName, text: &[u8]) -> Result<(Version, usize), Error> {
+    let told = Description::read(text).map_err(|message| file.fault(message))?;
+    Ok((told.version, told.variables.len()))
+}
+
 fn described(archive: &Archive) -> Result<Description, Message> {
     let text = archive.get("modelDescription.xml", description::LARGEST)?;
     Description::read(&text.ok_or_else(|| Message::new("the FMU has no modelDescription.xml"))?)

@@ -207,14 +207,6 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
         }
     }
 
-    /// Whether the converter is still one.
-    ///
-    /// # Errors
-    /// Why it is not.
-    pub fn check(&self) -> Result<(), Error> {
-        self.environment.failure().map_or(Ok(()), Err)
-    }
-
     /// One control period; returns the voltage error behind it.
     fn period(&mut self, change: Option<(f64, Load)>) -> (f64, f64) {
         let duty = (self.controller)(&self.sample);
@@ -377,7 +369,7 @@ where
     run.last_before(to, phase, task.tail, |record| records.push(record));
     run.disturb(&step)?;
     let metrics = run.measure(to, phase, task.after, task.tail, |record| records.push(record));
-    run.check()?;
+    run.environment.failure().map_or(Ok(()), Err)?;
     let zero = lead as f64 + phase;
     for record in &mut records {
         record.time = (record.time - zero) * t_sample;
@@ -423,7 +415,7 @@ where
             run.last_before(to, phase, task.tail, quiet);
             run.disturb(&step)?;
             let metrics = run.measure(to, phase, task.after, task.tail, quiet);
-            run.check()?;
+            run.environment.failure().map_or(Ok(()), Err)?;
             finding.add(*instant, metrics);
         }
         run.lead(1, task.tail, quiet);

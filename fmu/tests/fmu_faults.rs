@@ -1,6 +1,6 @@
 //! Every way in which an FMU can be wrong, before it runs and while it does.
 
-#![allow(clippy::unwrap_used)] // helpers of tests stand outside of #[test] functions
+#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests stand outside of #[test] functions
 
 mod common;
 

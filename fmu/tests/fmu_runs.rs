@@ -1,6 +1,6 @@
 //! An FMU goes as the plant does, from start to start, in copies and from checkpoints.
 
-#![allow(clippy::unwrap_used)] // helpers of tests stand outside of #[test] functions
+#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests stand outside of #[test] functions
 
 mod common;
 

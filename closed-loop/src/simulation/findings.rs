@@ -22,6 +22,9 @@ pub const POLICY: &str = "policy";
 /// Name of the law that a policy adds to, on its own.
 pub(super) const LAW: &str = "law alone";
 
+/// Makes a converter of a plant's file and numbers that take the place of the file's.
+type Load<'a> = dyn Fn(FileName, &[(String, f64)]) -> Result<Converter, Error> + 'a;
+
 /// A scenario with everything it needs, all of it sound.
 #[derive(Debug, Clone)]
 pub struct Setting {
@@ -111,7 +114,7 @@ impl Setting {
         scenario: Scenario,
         policy: Policy,
         plant: Option<FileName>,
-        load: &dyn Fn(FileName, &[(String, f64)]) -> Result<Converter, Error>,
+        load: &Load<'_>,
     ) -> Result<Self, Error> {
         let Some(name) = plant.or_else(|| scenario.plant.clone()) else {
             let message = Message::new("no plant").hint("plant = \"../plants/paper-model.toml\", or --plant PLANT");

@@ -1,6 +1,6 @@
 //! FMUs built from `model/buck.c`, and plant files that name them.
 
-#![allow(clippy::unwrap_used, dead_code)] // helpers of tests stand outside of #[test] functions; not every test file needs all
+#![allow(clippy::unwrap_used, clippy::panic, dead_code)] // helpers of tests stand outside of #[test] functions; not every test file needs all
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -76,6 +76,11 @@ pub trait Environment: Clone + Send {
     /// Applies a duty for one control period; the sample is taken at its end.
     fn step(&mut self, duty: f64, load: &LoadPath) -> Sample;
 
+    /// Why the converter has failed since its start, where something else than a plant computes it. Its samples are no numbers then.
+    fn failure(&self) -> Option<Error> {
+        None
+    }
+
     /// The source has this voltage from now on, V.
     ///
     /// # Errors
@@ -150,6 +155,10 @@ impl<E: Environment> Environment for Varied<E> {
 
     fn step(&mut self, duty: f64, load: &LoadPath) -> Sample {
         self.nominal.step(duty, load)
+    }
+
+    fn failure(&self) -> Option<Error> {
+        self.nominal.failure()
     }
 
     fn set_source(&mut self, v_in: f64) -> Result<(), Error> {

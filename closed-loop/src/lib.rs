@@ -19,6 +19,7 @@ mod faults;
 pub mod limit;
 mod load_step;
 mod map;
+pub mod outside;
 pub mod read;
 pub mod refit;
 mod rest;

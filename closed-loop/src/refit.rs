@@ -41,7 +41,10 @@ impl<E: Environment> Bench for AtEnvironment<E> {
 
     fn step(&mut self, duty: f64, load: &Load) -> Result<Signals, Error> {
         let sample = self.0.step(duty, &LoadPath::constant(*load));
-        // a simulator that has failed has no other way to say so
+        if let Some(error) = self.0.failure() {
+            return Err(error);
+        }
+        // another simulator that has failed has no other way to say so
         match sample.v_out.is_finite() {
             true => Ok(sample.measured),
             false => Err(Message::new("the simulation of the converter failed").into()),

@@ -338,7 +338,7 @@ impl Task {
 /// Runs one load step at one instant from a fresh start and records every period; time 0 is the step.
 ///
 /// # Errors
-/// If the converter cannot be started.
+/// If the converter cannot be started, or one from outside fails.
 pub fn load_step<E, C>(
     environment: E,
     controller: C,
@@ -369,6 +369,7 @@ where
     run.last_before(to, phase, task.tail, |record| records.push(record));
     run.disturb(&step)?;
     let metrics = run.measure(to, phase, task.after, task.tail, |record| records.push(record));
+    run.environment.failure().map_or(Ok(()), Err)?;
     let zero = lead as f64 + phase;
     for record in &mut records {
         record.time = (record.time - zero) * t_sample;
@@ -379,7 +380,7 @@ where
 /// Runs one load step at the given instants of `task`; the lead is run once and every instant goes on from a copy.
 ///
 /// # Errors
-/// If the converter cannot be started.
+/// If the converter cannot be started, or one from outside fails.
 pub fn survey<E, C>(
     environment: &E,
     controller: &C,
@@ -414,6 +415,7 @@ where
             run.last_before(to, phase, task.tail, quiet);
             run.disturb(&step)?;
             let metrics = run.measure(to, phase, task.after, task.tail, quiet);
+            run.environment.failure().map_or(Ok(()), Err)?;
             finding.add(*instant, metrics);
         }
         run.lead(1, task.tail, quiet);
@@ -424,7 +426,7 @@ where
 /// All load steps of a task.
 ///
 /// # Errors
-/// If the converter cannot be started.
+/// If the converter cannot be started, or one from outside fails.
 pub fn survey_all<E, C>(
     environment: &E,
     controller: &C,

@@ -177,7 +177,7 @@ fn a_transfer_that_is_ended_ran_nothing_more() {
     };
     let means = Means {
         simulator: "the plant",
-        simulate: Converter::new,
+        simulate: &|_, parameters| Converter::new(parameters),
         start: &start,
         ideal: false,
         tell: &mut tell,

@@ -17,15 +17,26 @@ impl Parameters {
     /// # Errors
     /// All faults: syntax, unknown keys, wrong types, values out of range, effects that lack a partner.
     pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
-        read(&Document::from_text(file, text)?, None)
+        read(&Document::from_text(file, text)?, None, Outside::Refused)
     }
 
     /// Reads a `plant.toml`.
     ///
     /// # Errors
-    /// As [`Parameters::from_toml`], and a file that cannot be read.
+    /// As [`Parameters::from_toml`], a file that cannot be read, and a converter that is not computed here: one with `[fmu]`.
     pub fn from_file(file: impl Into<FileName>) -> Result<Self, Faults> {
-        read(&Document::open(file)?, None)
+        read(&Document::open(file)?, None, Outside::Refused)
+    }
+
+    /// Reads the numbers of a `plant.toml` that controllers are designed on; beside `[fmu]` they are nominal ones. True if there is
+    /// such a table, which is not read.
+    ///
+    /// # Errors
+    /// As [`Parameters::from_toml`], and a file that cannot be read.
+    pub fn nominal_from_file(file: impl Into<FileName>) -> Result<(Self, bool), Faults> {
+        let document = Document::open(file)?;
+        let parameters = read(&document, None, Outside::Taken)?;
+        Ok((parameters, document.peek(&[FMU]).is_some()))
     }
 
     /// Reads a `plant.toml` for `what` (such as `drm fit`), which is built for the buck converter alone.
@@ -33,17 +44,47 @@ impl Parameters {
     /// # Errors
     /// As [`Parameters::from_file`], and another topology.
     pub fn buck_from_file(file: impl Into<FileName>, what: &str) -> Result<Self, Faults> {
-        read(&Document::open(file)?, Some(what))
+        read(&Document::open(file)?, Some(what), Outside::Refused)
     }
 }
 
-fn read(document: &Document, for_the_buck: Option<&str>) -> Result<Parameters, Faults> {
+impl Parameters {
+    /// [`Parameters::nominal_from_file`] of a buck converter, as [`Parameters::buck_from_file`].
+    ///
+    /// # Errors
+    /// As [`Parameters::nominal_from_file`], and another topology.
+    pub fn nominal_buck_from_file(file: impl Into<FileName>, what: &str) -> Result<(Self, bool), Faults> {
+        let document = Document::open(file)?;
+        let parameters = read(&document, Some(what), Outside::Taken)?;
+        Ok((parameters, document.peek(&[FMU]).is_some()))
+    }
+}
+
+/// The table that names a converter which is computed elsewhere; the crate `fmu` reads it.
+const FMU: &str = "fmu";
+
+/// What becomes of a file with [`FMU`].
+#[derive(PartialEq, Eq)]
+enum Outside {
+    /// Its numbers are read.
+    Taken,
+    /// The caller would compute another circuit, without a word.
+    Refused,
+}
+
+fn read(document: &Document, for_the_buck: Option<&str>, outside: Outside) -> Result<Parameters, Faults> {
     let mut reader = Reader {
         parameters: Parameters::default(),
         values: BTreeMap::new(),
         faults: Sink::new(),
     };
-    reader.table(document.root(), "");
+    let mut root = document.root();
+    if let Some(fmu) = root.optional(FMU).filter(|_| outside == Outside::Refused) {
+        let message = Message::new("this converter is an FMU, and the circuit of this program is asked for");
+        let hint = "`simulate`, `train`, `drm acquire` and `drm transfer` run it with --run-fmu; take [fmu] out for the nominal circuit";
+        reader.faults.push(fmu.fault(message.hint(hint)));
+    }
+    reader.table(root, "");
     reader.required(document);
     // a number that could not be read is still neutral here: its range and partners would be those of another plant
     if reader.faults.is_empty() {

@@ -14,6 +14,7 @@ mod drm;
 mod empirical;
 mod faults;
 mod files;
+mod fmu;
 mod gains;
 mod interruption;
 mod json;

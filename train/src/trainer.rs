@@ -195,6 +195,9 @@ impl<E: Environment> Trainer<E> {
         let duty = self.agent.act(action);
         let path = self.load_path();
         self.sample = self.environment.step(duty, &path);
+        if let Some(error) = self.environment.failure() {
+            return Err(error);
+        }
         self.load = path.end();
         self.agent.sense(&self.sample.measured)?;
 

@@ -10,7 +10,7 @@ use plant::Parameters;
 use policy::Interval;
 use toml_input::{Faults, messages};
 
-use super::shared::{Columns, ControllerKind, Outside};
+use super::shared::{Columns, ControllerKind, Foreign, Outside};
 use crate::ownership::Replacing;
 
 #[derive(Debug, Subcommand)]
@@ -27,6 +27,8 @@ pub enum Drm {
 
 #[derive(Debug, Args)]
 pub struct Acquire {
+    #[command(flatten)]
+    pub foreign: Foreign,
     /// The converter to measure, simulated; without it a plan for the bench is written
     #[arg(long, value_name = "FILE")]
     pub plant: Option<PathBuf>,
@@ -173,6 +175,8 @@ pub struct Judge {
 pub struct Transfer {
     #[command(flatten)]
     pub outside: Outside,
+    #[command(flatten)]
+    pub foreign: Foreign,
     /// Scenario file, as for `simulate`: load steps, instants; its plant is the converter that the policy was trained on
     pub scenario: PathBuf,
     /// policy.toml with a mapping, or the folder that holds it

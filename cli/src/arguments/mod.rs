@@ -20,7 +20,7 @@ use crate::ownership::Replacing;
 pub use campaign::{Campaign, Engine, Merge, Script};
 use drm::Drm;
 pub use plants::{Design, Limit, New};
-pub use shared::{Color, Columns, ControllerKind, Loudness, Outside};
+pub use shared::{Color, Columns, ControllerKind, Foreign, Loudness, Outside};
 pub use shell::{Completions, Manpages, Studio};
 pub use verify::Verify;
 
@@ -274,6 +274,8 @@ pub struct Certify {
 pub struct Simulate {
     #[command(flatten)]
     pub outside: Outside,
+    #[command(flatten)]
+    pub foreign: Foreign,
     /// Scenario file: plant, load steps, instants, classical controllers
     pub scenario: PathBuf,
     /// policy.toml or the folder that holds it
@@ -326,6 +328,8 @@ pub struct Targets {
 
 #[derive(Debug, Args)]
 pub struct Train {
+    #[command(flatten)]
+    pub foreign: Foreign,
     /// Training file: plant, contract, network, reward, scenarios, specification, seeds
     pub settings: PathBuf,
     /// Folder for the best seed's policy; those of all seeds go to `seeds` in it. Must not hold a policy yet

@@ -14,6 +14,14 @@ pub struct Outside {
     pub allow_outside: bool,
 }
 
+/// Whether foreign code may run.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct Foreign {
+    /// Run the FMU that a plant file names: foreign native code, in this process and with your rights
+    #[arg(long, display_order = 900)]
+    pub run_fmu: bool,
+}
+
 /// How much is said beside the answer.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct Loudness {

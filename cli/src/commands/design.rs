@@ -11,7 +11,7 @@ use crate::output;
 
 /// Prints the lines.
 pub fn run(options: &arguments::Design) -> Result<Outcome, Failure> {
-    let plant = Parameters::from_file(options.plant.as_path())?;
+    let plant = Parameters::nominal_from_file(options.plant.as_path())?.0;
     let model = match options.model_noise.as_deref() {
         None => None,
         Some(&[current, voltage, bias]) => Some([current, voltage, bias]),

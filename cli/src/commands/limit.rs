@@ -14,7 +14,7 @@ use crate::talk;
 
 /// Prints a table of limits.
 pub fn run(options: &Limit) -> Result<Outcome, Failure> {
-    let plant = Parameters::from_file(options.plant.as_path())?;
+    let (plant, is_outside) = Parameters::nominal_from_file(options.plant.as_path())?;
     let [low, high] = options.duty;
     if !(0.0..high).contains(&low) || high > 1.0 {
         let message = Message::new("--duty is no range").found(format!("{low},{high}"));
@@ -55,6 +55,11 @@ pub fn run(options: &Limit) -> Result<Outcome, Failure> {
         band_text(options.v_ref),
         limits(&found).trim_end()
     ))?;
+    if is_outside {
+        talk::note(
+            "the limit is that of the nominal numbers beside the FMU: that of an unknown model cannot be computed",
+        );
+    }
     let left_out = left_out(&plant);
     if !left_out.is_empty() {
         talk::note(&format!(

@@ -10,6 +10,7 @@ pub mod demo;
 pub mod design;
 pub mod diagnose;
 pub mod drm;
+mod foreign;
 pub mod inspect;
 pub mod limit;
 pub mod manpages;

@@ -62,7 +62,8 @@ fn for_weights(options: &New, weights: &Path) -> Result<Outcome, Failure> {
 }
 
 fn for_plant(options: &New, file: &Path, wanted: Wanted) -> Result<Outcome, Failure> {
-    let plant = Parameters::from_file(file)?;
+    // beside an FMU the nominal numbers: they are what is designed on
+    let (plant, is_fmu) = Parameters::nominal_from_file(file)?;
     let working = Working::new("designing, and searching the limit");
     let start = Start::new(&plant, file, wanted)?;
     drop(working);
@@ -83,9 +84,10 @@ fn for_plant(options: &New, file: &Path, wanted: Wanted) -> Result<Outcome, Fail
     start.notes().iter().for_each(|note| talk::note(note));
     let [training, scenario] = [TRAINING, SCENARIO].map(|name| out.with_file_name(name));
     let folder = out.with_file_name("trained");
+    let allowed = if is_fmu { " --run-fmu" } else { "" };
     output::say(&format!(
-        "wrote {}, {} and {}: signals, loads and limits are yours to change, then\n  policyc train {} --out {}\n  policyc simulate {} \
-         --policy {} --out {}",
+        "wrote {}, {} and {}: signals, loads and limits are yours to change, then\n  policyc train {}{allowed} --out {}\n  policyc simulate \
+         {}{allowed} --policy {} --out {}",
         out.display(),
         training.display(),
         scenario.display(),

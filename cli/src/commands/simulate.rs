@@ -10,6 +10,7 @@ use serde::Serialize;
 use toml_input::FileName;
 
 use super::controllers;
+use super::foreign::opener;
 use super::progress_line::ProgressLine;
 use crate::arguments::Simulate;
 use crate::failure::Failure;
@@ -71,12 +72,8 @@ pub fn check(options: &Simulate) -> Result<(), Failure> {
 fn setting(options: &Simulate) -> Result<Setting, Failure> {
     let scenario = Scenario::load(&options.scenario)?;
     let policy = super::load_as(&options.policy, options.outside, options.format)?;
-    let setting = Setting::new(
-        &options.scenario,
-        scenario,
-        policy,
-        options.plant.as_deref().map(FileName::new),
-    )?;
+    let plant = options.plant.as_deref().map(FileName::new);
+    let setting = Setting::open(&options.scenario, scenario, policy, plant, &opener(options.foreign))?;
     let spread = options
         .spread
         .iter()

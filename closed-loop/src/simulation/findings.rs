@@ -13,6 +13,7 @@ use crate::course::Course;
 use crate::faults::Error;
 use crate::limit::{Limit, left_out};
 use crate::load_step::{LoadKind, LoadStep};
+use crate::outside::Open;
 use crate::scenario_file::Scenario;
 use crate::suits::{draws, held_by, holds_power, reaches, suits, v_ref};
 
@@ -20,6 +21,9 @@ use crate::suits::{draws, held_by, holds_power, reaches, suits, v_ref};
 pub const POLICY: &str = "policy";
 /// Name of the law that a policy adds to, on its own.
 pub(super) const LAW: &str = "law alone";
+
+/// Makes a converter of a plant's file and numbers that take the place of the file's.
+type Load<'a> = dyn Fn(FileName, &[(String, f64)]) -> Result<Converter, Error> + 'a;
 
 /// A scenario with everything it needs, all of it sound.
 #[derive(Debug, Clone)]
@@ -88,12 +92,38 @@ impl Setting {
     /// # Errors
     /// If no plant or no voltage to hold is named, the plant's file is none, or policy and plant do not suit each other.
     pub fn new(file: &Path, scenario: Scenario, policy: Policy, plant: Option<FileName>) -> Result<Self, Error> {
+        Self::load(file, scenario, policy, plant, &Converter::load)
+    }
+
+    /// [`Setting::new`], of which a converter from outside is opened by `open`.
+    ///
+    /// # Errors
+    /// As [`Setting::new`], and those of `open`.
+    pub fn open(
+        file: &Path,
+        scenario: Scenario,
+        policy: Policy,
+        plant: Option<FileName>,
+        open: &Open<'_>,
+    ) -> Result<Self, Error> {
+        Self::load(file, scenario, policy, plant, &|name, set| {
+            Converter::open(name, set, open)
+        })
+    }
+
+    fn load(
+        file: &Path,
+        scenario: Scenario,
+        policy: Policy,
+        plant: Option<FileName>,
+        load: &Load<'_>,
+    ) -> Result<Self, Error> {
         let Some(name) = plant.or_else(|| scenario.plant.clone()) else {
             let message = Message::new("no plant").hint("plant = \"../plants/paper-model.toml\", or --plant PLANT");
             return Err(Fault::in_file(file, message).into());
         };
         let plant = name.shown.clone();
-        let converter = Converter::load(name, &scenario.set)?;
+        let converter = load(name, &scenario.set)?;
         let references: Vec<f64> = (scenario.load_steps.iter().filter_map(|step| step.reference))
             .flatten()
             .collect();
@@ -134,7 +164,8 @@ impl Setting {
     /// # Errors
     /// If the file is no plant, or one of another topology or control period, for which a design would mean nothing here.
     pub fn designed_on(mut self, file: &Path) -> Result<Self, Error> {
-        let nominal = Parameters::from_file(FileName::new(file))?;
+        // a design is made from numbers: those beside a converter from outside are meant for it
+        let (nominal, _) = Parameters::nominal_from_file(FileName::new(file))?;
         let (ours, theirs) = (self.converter.parameters(), &nominal);
         if ours.converter.topology != theirs.converter.topology || ours.converter.f_sw != theirs.converter.f_sw {
             let word = |p: &Parameters| format!("a {} at {} Hz", p.converter.topology.word(), p.converter.f_sw);
@@ -232,6 +263,18 @@ fn notes(scenario: &Scenario, policy: &Policy, converter: &Converter, v_ref: f64
                 [one] => format!("the observer `{one}`"),
                 several => format!("the observers {}, each behind each", several.join(", ")),
             }
+        ));
+    }
+    if let Some(outside) = converter.outside() {
+        notes.extend(outside.notes());
+        let name = outside.name();
+        let limit = if scenario.limits.is_empty() {
+            ""
+        } else {
+            ", and so is the limit: that of an unknown model cannot be computed"
+        };
+        notes.push(format!(
+            "classical controllers are designed on the nominal numbers beside {name}{limit}"
         ));
     }
     let left_out = left_out(converter.parameters());

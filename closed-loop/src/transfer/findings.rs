@@ -39,8 +39,8 @@ pub struct Setting {
 pub struct Means<'a, E> {
     /// What simulates the real converters, as in "simulated by ngspice".
     pub simulator: &'static str,
-    /// A real converter with these parameters.
-    pub simulate: fn(&Parameters) -> Result<E, Error>,
+    /// The real converter of a plant's file with these numbers.
+    pub simulate: &'a dyn Fn(&Path, &Parameters) -> Result<E, Error>,
     /// The controller of a policy, started.
     pub start: &'a dyn Fn(&Policy) -> Result<Named, Error>,
     /// Run the exact mapping of a converter as well, from the formula of its losses.

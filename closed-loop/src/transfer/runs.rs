@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use drm::DutyRatioMap;
 use drm::formula::Losses;
 use plant::Parameters;
+use toml_input::{Fault, Message};
 
 use super::findings::{EXACT, Findings, MAPPED, Means, Real, Run, SIMULATION, Setting, UNMAPPED};
 use super::ideal::Ideal;
@@ -41,9 +42,20 @@ pub fn transfer<E: Environment>(
 ) -> Result<Findings, Error> {
     let mut benches = Vec::new();
     for path in real {
-        let parameters = Parameters::buck_from_file(path.as_path(), "a transfer")?;
+        let (parameters, is_outside) = Parameters::nominal_buck_from_file(path.as_path(), "a transfer")?;
         suits(&setting.policy, &parameters, setting.v_ref, path)?;
-        benches.push((path, parameters));
+        if is_outside && means.ideal {
+            let message = Message::new("the exact mapping of this converter is not known").found("an FMU");
+            let message = message.hint("it is the formula of a plant's losses; leave --ideal out");
+            return Err(Fault::in_file(path, message).into());
+        }
+        let simulated = (means.simulate)(path, &parameters)?;
+        benches.push(Bench {
+            path,
+            parameters,
+            is_outside,
+            simulated,
+        });
     }
     let unmapped = (means.start)(&setting.refit().with(&DutyRatioMap::IDENTITY)?)?;
     let (controller, mut unmapped) = (unmapped.name, unmapped.controller);
@@ -60,28 +72,41 @@ pub fn transfer<E: Environment>(
         controller,
         real: Vec::new(),
     };
-    for (path, parameters) in &benches {
-        let real = one(&found.setting, path, parameters, unmapped.as_mut(), &mut progress)?;
+    for bench in &benches {
+        let real = one(&found.setting, bench, unmapped.as_mut(), &mut progress)?;
         found.real.push(real);
     }
     Ok(found)
 }
 
+/// A real converter before its runs.
+struct Bench<'a, E> {
+    path: &'a Path,
+    /// Its numbers; of one that no plant computes the nominal ones.
+    parameters: Parameters,
+    is_outside: bool,
+    simulated: E,
+}
+
 /// The procedure at one converter: without a mapping, acquire, fit, with it.
 fn one<E: Environment>(
     setting: &Setting,
-    path: &Path,
-    real: &Parameters,
+    bench: &Bench<'_, E>,
     unmapped: &mut dyn Controller,
     progress: &mut Progress<'_, '_, E>,
 ) -> Result<Real, Error> {
+    let Bench {
+        path,
+        parameters: real,
+        is_outside,
+        simulated,
+    } = bench;
     path.display().to_string().clone_into(&mut progress.at);
-    let simulated = (progress.means.simulate)(real)?;
-    let mut runs = vec![run(UNMAPPED, setting, &simulated, unmapped, progress)?];
-    let points = acquire(setting, real, &simulated, progress)?;
+    let mut runs = vec![run(UNMAPPED, setting, simulated, unmapped, progress)?];
+    let points = acquire(setting, real, simulated, progress)?;
     let report = setting.refit().fit(&points)?;
     let mut mapped = (progress.means.start)(&setting.refit().with(&report.fit.map)?)?;
-    runs.push(run(MAPPED, setting, &simulated, mapped.controller.as_mut(), progress)?);
+    runs.push(run(MAPPED, setting, simulated, mapped.controller.as_mut(), progress)?);
     let mut notes = report.notes.clone();
     if progress.means.ideal {
         let mut ideal = Ideal {
@@ -90,14 +115,23 @@ fn one<E: Environment>(
             real: Losses::of(real)?,
             limits: setting.policy.limits.duty,
         };
-        runs.push(run(EXACT, setting, &simulated, &mut ideal, progress)?);
+        runs.push(run(EXACT, setting, simulated, &mut ideal, progress)?);
     }
     notes.extend(runs.iter().flat_map(ended_early));
+    let remarks = if *is_outside {
+        notes.push(
+            "what no mapping repairs is not known of an FMU: it is told from the formula of a plant's losses"
+                .to_owned(),
+        );
+        Vec::new()
+    } else {
+        setting.refit().beyond_repair(real, &report.fit.map)?
+    };
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     Ok(Real {
         name: stem.unwrap_or_default(),
         points,
-        remarks: setting.refit().beyond_repair(real, &report.fit.map)?,
+        remarks,
         report,
         runs,
         notes,

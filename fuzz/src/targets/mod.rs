@@ -11,6 +11,7 @@ mod policies;
 mod seeds;
 mod steps;
 mod tools;
+mod units;
 
 pub(crate) use folders::folder;
 
@@ -43,13 +44,14 @@ impl std::fmt::Debug for Target {
 
 /// All targets but those with planted faults.
 pub fn all() -> impl Iterator<Item = &'static Target> {
-    let lists: [&'static [Target]; 6] = [
+    let lists: [&'static [Target]; 7] = [
         policies::TARGETS,
         imports::TARGETS,
         measurements::TARGETS,
         converters::TARGETS,
         tools::TARGETS,
         steps::TARGETS,
+        units::TARGETS,
     ];
     lists.into_iter().flatten()
 }

@@ -16,6 +16,7 @@ const LAYERS: &[&[&str]] = &[
         "policy-build",
         "train",
         "spice",
+        "fmu",
         "diagnose",
         "verify",
         "prove",

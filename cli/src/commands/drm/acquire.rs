@@ -1,5 +1,8 @@
 //! `policyc drm acquire`
 
+use std::path::Path;
+
+use closed_loop::outside::Outside;
 use closed_loop::refit::AtEnvironment;
 use closed_loop::{Converter, Error};
 use drm::Table;
@@ -9,28 +12,29 @@ use plant::Parameters;
 use spice::SpiceConverter;
 
 use crate::arguments::drm::{Acquire, Simulator};
+use crate::commands::foreign::opener;
 use crate::commands::progress_line::{Pace, ProgressLine};
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::talk;
 
 /// Measures or plans.
 pub fn run(options: &Acquire) -> Result<Outcome, Failure> {
-    let parameters = options
-        .plant
-        .as_deref()
-        .map(|path| Parameters::buck_from_file(path, "`drm acquire`"))
+    let plant = options.plant.as_deref();
+    let parameters = plant
+        .map(|path| Parameters::nominal_buck_from_file(path, "`drm acquire`"))
         .transpose()?;
-    let nominal = parameters.as_ref().map(|parameters| parameters.converter.v_in);
+    let nominal = parameters.as_ref().map(|(parameters, _)| parameters.converter.v_in);
     let v_in = options.v_in.or(nominal).unwrap_or_default();
     let mut plan = Plan::new(v_in, &options.duties.0, &options.loads.settings(), options.cool_down)?;
     let kept = match &options.resume {
         Some(path) => plan.resume(&Sheet::open(path, &Table::file_options())?)?,
         None => 0,
     };
-    let measured = match &parameters {
-        Some(parameters) => measure_open(options, parameters, &mut plan)?,
-        None => 0,
+    let measured = match (&parameters, plant) {
+        (Some((parameters, _)), Some(path)) => measure_open(options, path, parameters, &mut plan)?,
+        _ => 0,
     };
     output::write_one(&options.out, &plan.to_csv()?)?;
     output::say(&summary(options, &plan, kept, measured))?;
@@ -39,8 +43,8 @@ pub fn run(options: &Acquire) -> Result<Outcome, Failure> {
 
 /// Measures what is open; in ngspice, where it takes long, the table is written after each point, so that an
 /// interrupted run can be resumed.
-fn measure_open(options: &Acquire, parameters: &Parameters, plan: &mut Plan) -> Result<usize, Failure> {
-    let mut bench = bench(options.simulator, parameters)?;
+fn measure_open(options: &Acquire, path: &Path, parameters: &Parameters, plan: &mut Plan) -> Result<usize, Failure> {
+    let mut bench = bench(options, path, parameters)?;
     let protocol = Protocol {
         window: options.window as usize,
         most_windows: options.most_windows as usize,
@@ -65,10 +69,23 @@ fn measure_open(options: &Acquire, parameters: &Parameters, plan: &mut Plan) -> 
 }
 
 /// A simulated converter as one that settled points are measured at.
-fn bench(simulator: Simulator, parameters: &Parameters) -> Result<Box<dyn Bench<Error = Error>>, Error> {
-    Ok(match simulator {
-        Simulator::Plant => Box::new(AtEnvironment(Converter::new(parameters)?)),
-        Simulator::Ngspice => Box::new(AtEnvironment(SpiceConverter::new(parameters)?)),
+fn bench(options: &Acquire, path: &Path, parameters: &Parameters) -> Result<Box<dyn Bench<Error = Error>>, Error> {
+    Ok(match options.simulator {
+        Simulator::Plant => {
+            let converter = Converter::open(path, &[], &opener(options.foreign))?;
+            converter
+                .outside()
+                .map(Outside::notes)
+                .into_iter()
+                .flatten()
+                .for_each(|note| talk::note(&note));
+            Box::new(AtEnvironment(converter))
+        }
+        Simulator::Ngspice => {
+            // read once more: ngspice has no FMU
+            Parameters::from_file(path)?;
+            Box::new(AtEnvironment(SpiceConverter::new(parameters)?))
+        }
     })
 }
 

@@ -1,5 +1,6 @@
 //! `policyc drm transfer`: the paper's procedure, from the simulation to converters that are not the simulated one
 
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use closed_loop::transfer::{Findings, Means, PAGE, Setting, transfer};
@@ -9,6 +10,7 @@ use spice::SpiceConverter;
 
 use crate::arguments::drm::{Simulator, Transfer};
 use crate::commands::controllers;
+use crate::commands::foreign::opener;
 use crate::commands::progress_line::ProgressLine;
 use crate::failure::Failure;
 use crate::interruption;
@@ -25,8 +27,22 @@ pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
     let setting = Setting::new(&options.scenario, scenario, policy)?;
     let stop = interruption::stop_on_signal();
     let found = match options.simulator {
-        Simulator::Plant => at(options, setting, "the plant of this program", Converter::new),
-        Simulator::Ngspice => at(options, setting, "ngspice", SpiceConverter::new),
+        Simulator::Plant => {
+            let open = opener(options.foreign);
+            let names_fmu = |path: &PathBuf| Parameters::nominal_from_file(path).is_ok_and(|(_, is_fmu)| is_fmu);
+            let simulator = match options.real.iter().filter(|path| names_fmu(path)).count() {
+                0 => "the plant of this program",
+                n if n == options.real.len() => "FMUs",
+                _ => "FMUs, and the plant of this program where a file names none",
+            };
+            at(options, setting, simulator, &|path, _| {
+                Converter::open(path, &[], &open)
+            })
+        }
+        Simulator::Ngspice => at(options, setting, "ngspice", &|path, _| {
+            // read once more: ngspice has no FMU
+            SpiceConverter::new(&Parameters::from_file(path)?)
+        }),
     };
     if stop.load(Ordering::Relaxed) {
         talk::interrupted("nothing written");
@@ -51,7 +67,7 @@ fn at<E: Environment>(
     options: &Transfer,
     setting: Setting,
     simulator: &'static str,
-    simulate: fn(&Parameters) -> Result<E, Error>,
+    simulate: &dyn Fn(&Path, &Parameters) -> Result<E, Error>,
 ) -> Result<Findings, Failure> {
     let mut line = ProgressLine::new();
     let means = Means {

@@ -11,12 +11,14 @@ use train::{
     Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, page, seeds, tables, train_all,
 };
 
+use super::foreign::opener;
 use crate::arguments::Train;
 use crate::failure::Failure;
 use crate::interruption;
 use crate::made;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::talk;
 use report::grouped;
 
 mod kept;
@@ -53,11 +55,11 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
         settings.seeds = distinct(&options.seeds)?;
     }
     let contract = Contract::load(&settings.contract, &settings.hidden)?;
-    let converter = Converter::load(FileName::named_by_a_file(&settings.plant), &settings.set)?;
+    let converter = converter(options, &settings)?;
     closed_loop::holds_power(converter.parameters(), settings.reward.v_ref, &settings.plant)?;
     let kept = Kept::new(&options.out);
     let course = Course {
-        threads: options.threads,
+        threads: threads(options, &converter),
         checkpoints: kept.prepare(&settings.seeds, options.resume)?,
         checkpoint_every: Some(CHECKPOINT_EVERY),
     };
@@ -100,8 +102,31 @@ pub fn ready(out: &Path, seeds: &[u64], resume: bool) -> Result<(), Failure> {
 pub fn check(options: &Train) -> Result<(), Failure> {
     let settings = Settings::load(&options.settings)?;
     Contract::load(&settings.contract, &settings.hidden)?;
-    Converter::load(FileName::named_by_a_file(&settings.plant), &settings.set)?;
+    converter(options, &settings)?;
     Ok(())
+}
+
+/// What is trained on.
+fn converter(options: &Train, settings: &Settings) -> Result<Converter, Failure> {
+    let file = FileName::named_by_a_file(&settings.plant);
+    Ok(Converter::open(file, &settings.set, &opener(options.foreign))?)
+}
+
+/// Cores that a training may use. Of an FMU that is there once in a process one: two seeds would take it from each other at every
+/// step, and each repeat its run.
+fn threads(options: &Train, converter: &Converter) -> usize {
+    let Some(outside) = converter.outside() else {
+        return options.threads;
+    };
+    outside.notes().iter().for_each(|note| talk::note(note));
+    if !outside.is_only_one() || options.threads == 1 {
+        return options.threads;
+    }
+    talk::note(&format!(
+        "{} runs once in a process: the seeds are trained one after the other",
+        outside.name()
+    ));
+    1
 }
 
 /// Writes the seeds' folders, the best one's last: a folder with a `policy.toml` is a whole training.

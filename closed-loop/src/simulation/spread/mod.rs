@@ -10,8 +10,6 @@ mod figures;
 mod range;
 mod shown;
 
-use plant::Parameters;
-
 pub(super) use range::check;
 pub use range::{Draws, Spread};
 pub(super) use shown::Json;
@@ -20,7 +18,6 @@ use super::findings::Setting;
 use super::runs::knows;
 use crate::controller::{Controller, follow};
 use crate::converter::Converter;
-use crate::environment::varied;
 use crate::faults::Error;
 use crate::scenario::{Metrics, Task};
 
@@ -67,13 +64,12 @@ pub(super) fn run(
     for (n, numbers) in converters.into_iter().enumerate() {
         let keys = of.iter().map(|spread| spread.key.as_str());
         let named: Vec<(&str, f64)> = keys.zip(numbers.clone()).collect();
-        let parameters = varied(setting.converter.parameters(), &named);
         let text: Vec<String> = named
             .iter()
             .map(|(key, value)| format!("{key} = {value:.4e}"))
             .collect();
         tell(&format!("converter {} of {count}: {}", n + 1, text.join(", ")))?;
-        cells.push(cell(setting, &parameters, numbers, controllers)?);
+        cells.push(cell(setting, &setting.converter.with(&named)?, numbers, controllers)?);
     }
     Ok(Some(Spreads {
         of: of.clone(),
@@ -84,11 +80,10 @@ pub(super) fn run(
 
 fn cell(
     setting: &Setting,
-    parameters: &Parameters,
+    converter: &Converter,
     numbers: Vec<f64>,
     controllers: &mut [(&str, &mut Box<dyn Controller>)],
 ) -> Result<Cell, Error> {
-    let converter = Converter::new(parameters)?;
     let task = Task {
         instants: INSTANTS,
         sampling_instants: 1,
@@ -99,7 +94,7 @@ fn cell(
         let mut metrics = Metrics::default();
         for step in setting.scenario.load_steps.iter().filter(|step| knows(name, **step)) {
             for instant in task.all_instants() {
-                let trajectory = follow(&converter, controller.as_mut(), setting.v_ref, &task, *step, instant)?;
+                let trajectory = follow(converter, controller.as_mut(), setting.v_ref, &task, *step, instant)?;
                 metrics = metrics.worst(trajectory.metrics);
             }
         }

@@ -29,6 +29,7 @@ pub mod model;
 mod names;
 mod notes;
 mod observer;
+mod output;
 mod raw;
 mod resized;
 pub mod rounding;

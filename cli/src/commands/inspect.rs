@@ -29,7 +29,7 @@ pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
             let decided = match policy.head {
                 Head::Continuous(_) => "the trainer's duties more",
                 Head::Schedule(_) => "the trainer's gains more",
-                Head::Choice(_) | Head::Residual(_) => "more of the trainer's decisions",
+                Head::Choice(_) | Head::Residual(_) | Head::Several(_) => "more of the trainer's decisions",
             };
             eprintln!("\nDIFFERENT: the numeric format changes {decided} than the contract allows");
             Ok(Outcome::Different)

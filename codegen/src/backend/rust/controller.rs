@@ -5,12 +5,12 @@ use proc_macro2::{Ident, Literal as Token, TokenStream};
 use quote::quote;
 
 use super::number::{self, number};
-use super::statements::Printer;
+use super::statements::{Printer, remembered};
 use super::tokens::{ident, size, word};
 use super::{guard, integrity, mapping, network, tables};
 use crate::lower::command;
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
-use crate::program::{Element, Literal, Program, StateMember, StateValue};
+use crate::program::{Duty, Element, Literal, Program, StateMember, StateValue};
 
 /// Type and implementation.
 pub fn items(program: &Program, name: &Ident) -> TokenStream {
@@ -281,18 +281,23 @@ fn decide(program: &Program) -> TokenStream {
     let decide = &program.decide;
     let printer = Printer::new(program, &decide.block);
     let statements = &printer.statements;
-    let duty = printer.operand(decide.duty);
     let terms = decide.status.iter().map(|(bit, flag)| {
         let (flag, bit) = (printer.operand(*flag), word(*bit));
         quote!((#flag << #bit))
     });
-    let fallback = number(program.scalar(), program.fallback_duty);
     // shifted and not masked, which is an instruction less on Arm
     let fallback_bit = word(command::bit("FALLBACK"));
     // behind its limits, which lie within 0 and 1, a duty has the second highest bit only if it is no number
-    let stray = match program.scalar() {
+    let scalar = program.scalar();
+    let stray = |duty: TokenStream| match scalar {
         Scalar::F32 => quote!((#duty.to_bits() >> 30)),
         Scalar::F64 => quote!((#duty.to_bits() >> 62) as u32),
+    };
+    let operands = decide.duties.iter().map(|duty| printer.operand(duty.duty));
+    let strays: Vec<TokenStream> = operands.map(stray).collect();
+    let stray = match strays.as_slice() {
+        [one] => one.clone(),
+        all => quote!((#(#all)|*)),
     };
     let network::Choice {
         about,
@@ -300,10 +305,20 @@ fn decide(program: &Program) -> TokenStream {
         kind,
         name,
         body,
-        index,
+        chosen,
+        indices,
     } = network::choice(program);
     let number_kind = number::kind(program.scalar());
-    let duty_sim = printer.operand(decide.duty_sim);
+    let selected = |pick: fn(&Duty) -> usize| {
+        let both = decide.duties.iter().zip(&program.outputs);
+        let each = both.map(|(duty, output)| {
+            let (value, fallback) = (printer.operand(pick(duty)), number(scalar, output.fallback));
+            quote!(select(usable, #value, #fallback))
+        });
+        listed(each.collect())
+    };
+    let (duty, duty_sim) = (selected(|duty| duty.duty), selected(|duty| duty.duty_sim));
+    let index = listed(indices);
     let apart = program.senses_again.then(|| {
         quote! {
             #[doc = #about_apart]
@@ -332,13 +347,14 @@ fn decide(program: &Program) -> TokenStream {
         /// Mapping, limits, status.
         #[inline(always)]
         fn decide(&self, front: &Front, sound: u32, #name: #kind) -> Command {
+            #(#chosen)*
             #(#statements)*
             let trusted = sound & !#stray;
             let usable = front.usable & trusted;
             let status = #(#terms)|*;
             Command {
-                duty: select(usable, #duty, #fallback),
-                duty_sim: select(usable, #duty_sim, #fallback),
+                duty: #duty,
+                duty_sim: #duty_sim,
                 action_index: #index,
                 status: (status & 0_u32.wrapping_sub(usable))
                     | ((usable ^ 1) << #fallback_bit)
@@ -348,12 +364,30 @@ fn decide(program: &Program) -> TokenStream {
     }
 }
 
+/// One value, or several as an array.
+fn listed(values: Vec<TokenStream>) -> TokenStream {
+    match values.as_slice() {
+        [one] => one.clone(),
+        all => quote!([#(#all),*]),
+    }
+}
+
 fn advance(program: &Program) -> TokenStream {
     let printer = Printer::new(program, &program.advance.block);
     let statements = &printer.statements;
-    let soft_cap = program.advance.soft_cap.map(|id| {
-        let value = printer.operand(id);
-        quote! { self.soft_cap = #value; }
+    let caps = program.advance.soft_caps.iter().enumerate();
+    let soft_caps = caps.filter_map(|(output, id)| {
+        let (place, value) = (remembered(program, "soft_cap", output), printer.operand((*id)?));
+        Some(quote! { #place = #value; })
+    });
+    let duties = (0..program.outputs.len()).map(|output| {
+        let [duty, command] = ["previous_duty", "previous_command"].map(|stem| remembered(program, stem, output));
+        let at = size(output);
+        let place = program.has_several().then(|| quote!([#at]));
+        quote! {
+            #duty = command.duty_sim #place;
+            #command = command.duty #place;
+        }
     });
     let pushes = program.front.pushes.iter().enumerate().map(|(index, push)| {
         let (first, last, length) = (size(push.word), size(push.word + push.length - 1), size(push.length));
@@ -377,10 +411,9 @@ fn advance(program: &Program) -> TokenStream {
         fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
             #(#statements)*
             #(#pushes)*
-            #soft_cap
+            #(#soft_caps)*
             self.held = front.signal;
-            self.previous_duty = command.duty_sim;
-            self.previous_command = command.duty;
+            #(#duties)*
             self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
             // 0 or 1; of a damaged state, which is never usable, 2
             self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);

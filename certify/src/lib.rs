@@ -103,7 +103,11 @@ impl Certifier {
                 .flat_map(|output| match &output.head {
                     Head::Continuous(head) => {
                         let at = output.column;
-                        vec![actor::duty_bound(head, enclosure.q_value(at), enclosure.error_bound(at))]
+                        vec![actor::duty_bound(
+                            head,
+                            enclosure.q_value(at),
+                            enclosure.error_bound(at),
+                        )]
                     }
                     own => {
                         let columns = output.column..output.column + own.outputs();

@@ -175,7 +175,7 @@ mod tests {
                 estimates: &[],
                 previous_duty: 0.25,
                 previous_command: 0.75,
-            others: &[],
+                others: &[],
             },
             &[],
             false,

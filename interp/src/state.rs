@@ -131,7 +131,8 @@ impl<T: Real> State<T> {
         let duties = [&mut self.previous_duty, &mut self.previous_command];
         let others = self.others.iter_mut().flat_map(|own| {
             let mapping = own.mapping.iter_mut();
-            let mapping = mapping.flat_map(|own| [Some(&mut own.a), Some(&mut own.b), Some(&mut own.c), own.r.as_mut()]);
+            let mapping =
+                mapping.flat_map(|own| [Some(&mut own.a), Some(&mut own.b), Some(&mut own.c), own.r.as_mut()]);
             let duties = [&mut own.previous_duty, &mut own.previous_command];
             duties.into_iter().chain(&mut own.soft_cap).chain(mapping.flatten())
         });

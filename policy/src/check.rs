@@ -194,9 +194,14 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     let signals: Option<Vec<Signal>> = signals.list.into_iter().collect();
     let whole = observers.whole();
     let inputs = match (&signals, &whole, &limits, &fallback) {
-        (Some(signals), Some(whole), Some(limits), Some(fallback)) => {
-            Some(Inputs::new(signals, whole, &duties, several(&decided), limits, fallback))
-        }
+        (Some(signals), Some(whole), Some(limits), Some(fallback)) => Some(Inputs::new(
+            signals,
+            whole,
+            &duties,
+            several(&decided),
+            limits,
+            fallback,
+        )),
         _ => None,
     };
     let bounded = match (&inputs, head.sample_period) {
@@ -343,7 +348,9 @@ fn bound_law(raw: &RawPolicy, head: &Head, inputs: &Inputs, faults: &mut Sink) {
 /// The notes on one of several outputs, each with its name.
 fn of_output(output: &Output, features: &[Feature]) -> Vec<String> {
     let notes = on_duties(&output.limits, &output.head.duties(), output.mapping.as_ref(), features);
-    let named = notes.into_iter().map(|note| format!("output `{}`: {note}", output.name));
+    let named = notes
+        .into_iter()
+        .map(|note| format!("output `{}`: {note}", output.name));
     named.collect()
 }
 
@@ -380,8 +387,7 @@ fn bound_mapping(
         high: duties.iter().fold(0.0, |high, duty| duty.max(high)),
     };
     if let Err(magnitude) = mapping::magnitude_fits(mapping, current, duties) {
-        let file = document
-            .map_or(&raw.contract.source().name, |document| &document.source().name);
+        let file = document.map_or(&raw.contract.source().name, |document| &document.source().name);
         faults.push(file.fault(catalogue::may_overflow("the mapped duty", magnitude)));
     }
 }

@@ -11,8 +11,8 @@ use sha2::{Digest, Sha256};
 
 use crate::activation::Activation;
 use crate::model::{
-    Action, Continuous, Digests, Expr, Fallback, Feature, Filter, Head, Interval, Layer, Limits, Mapping, NumericFormat,
-    Observer, Output, Policy, Residual, Schedule, Signal,
+    Action, Continuous, Digests, Expr, Fallback, Feature, Filter, Head, Interval, Layer, Limits, Mapping,
+    NumericFormat, Observer, Output, Policy, Residual, Schedule, Signal,
 };
 
 #[derive(Serialize)]

@@ -14,8 +14,8 @@ pub use crate::head::{Action, Continuous, Factor, Gain, Head, Pair, Residual, Sc
 pub use crate::interval::Interval;
 use crate::known_answers;
 pub use crate::known_answers::Golden;
-pub use crate::output::{DutyPath, Output};
 pub use crate::observer::{Circuit, Estimate, Gains, Hold, InputVoltage, Observer, OnTime};
+pub use crate::output::{DutyPath, Output};
 
 /// Number format in which the whole controller computes (`docs/reference/numeric-contract.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -58,16 +58,24 @@ fn planted_defects_in_the_second_output_are_caught() {
         })
         .expect("a policy whose second output is a choice with a slew limit");
     let host = targets::find("host").unwrap();
-    let clean = codegen::sources(&policy, host, &[codegen::Output::C], None).unwrap().files;
+    let clean = codegen::sources(&policy, host, &[codegen::Output::C], None)
+        .unwrap()
+        .files;
     let source = format!("{}.c", policy.name);
     let column = policy.paths()[1].column;
     let edits = [
         // another column of the last layer
-        (format!("_greedy(&outputs[{column}],"), format!("_greedy(&outputs[{}],", column - 1)),
+        (
+            format!("_greedy(&outputs[{column}],"),
+            format!("_greedy(&outputs[{}],", column - 1),
+        ),
         // remembered in the place of another output
         ("command->duty[1];".to_owned(), "command->duty[0];".to_owned()),
         // the slew limit around another output's command
-        ("= command->duty_sim[1];".to_owned(), "= command->duty_sim[0];".to_owned()),
+        (
+            "= command->duty_sim[1];".to_owned(),
+            "= command->duty_sim[0];".to_owned(),
+        ),
     ];
     for (from, to) in edits {
         let text = &clean[&source];

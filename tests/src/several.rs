@@ -52,7 +52,10 @@ fn files(seed: u64) -> Result<(String, Files), SafeTensorError> {
             match own.find(" previous_").or(own.starts_with("previous_").then_some(0)) {
                 Some(at) => {
                     let (before, behind) = own.split_at(at);
-                    format!("{before}{}", behind.replacen("previous_", &format!("{name}_previous_"), 1))
+                    format!(
+                        "{before}{}",
+                        behind.replacen("previous_", &format!("{name}_previous_"), 1)
+                    )
                 }
                 None => own,
             }
@@ -60,7 +63,10 @@ fn files(seed: u64) -> Result<(String, Files), SafeTensorError> {
         feature(&mut text, &mut rng, index, &own);
     }
     // one output always reads what another one commanded
-    text += &format!("[[feature]]\nname = \"told\"\nsource = \"{}_previous_command - {}_previous_duty\"\n\n", NAMES[1], NAMES[0]);
+    text += &format!(
+        "[[feature]]\nname = \"told\"\nsource = \"{}_previous_command - {}_previous_duty\"\n\n",
+        NAMES[1], NAMES[0]
+    );
     let _ = writeln!(text, "[network]\nweights = \"weights.safetensors\"");
     let kinds = Activation::EACH;
     let activations: Vec<String> = hidden.iter().map(|_| kinds[rng.below(kinds.len())].written()).collect();
@@ -117,7 +123,10 @@ fn output(rng: &mut SplitMix, name: &str, signals: usize) -> (String, usize) {
     }
     if !rng.one_in(3) {
         let current = rng.below(signals);
-        let _ = writeln!(text, "[output.mapping]\nfile = \"{name}.toml\"\nload_current = \"s{current}\"");
+        let _ = writeln!(
+            text,
+            "[output.mapping]\nfile = \"{name}.toml\"\nload_current = \"s{current}\""
+        );
     }
     let (low, high) = (rng.uniform(0.0, 0.4), rng.uniform(0.6, 1.0));
     let _ = writeln!(text, "[output.limits]\nduty = [{low:?}, {high:?}]");
@@ -126,7 +135,11 @@ fn output(rng: &mut SplitMix, name: &str, signals: usize) -> (String, usize) {
     }
     if rng.one_in(2) {
         let from = rng.uniform(0.0, high);
-        let _ = writeln!(text, "soft_start = {{ from = {from:?}, steps = {} }}", 1 + rng.below(200));
+        let _ = writeln!(
+            text,
+            "soft_start = {{ from = {from:?}, steps = {} }}",
+            1 + rng.below(200)
+        );
     }
     if rng.one_in(2) {
         let _ = writeln!(text, "initial_duty = {:?}", rng.uniform(0.0, 1.0));

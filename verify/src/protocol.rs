@@ -117,8 +117,12 @@ impl Layout {
         let paths = policy.paths();
         let named = |name: &str, path: &DutyPath<'_>| path.name.map_or(name.to_owned(), |own| format!("{name} {own}"));
         let duties = ["duty", "duty_sim"];
-        let duties = duties.into_iter().flat_map(|name| paths.iter().map(move |path| named(name, path)));
-        let indices = paths.iter().map(|path| word(named("action_index", path), WordKind::Integer));
+        let duties = duties
+            .into_iter()
+            .flat_map(|name| paths.iter().map(move |path| named(name, path)));
+        let indices = paths
+            .iter()
+            .map(|path| word(named("action_index", path), WordKind::Integer));
         let status = [word("status".to_owned(), WordKind::Status)];
         let command = duties.flat_map(number).chain(indices).chain(status);
         let step = observation

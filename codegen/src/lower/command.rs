@@ -137,12 +137,7 @@ fn changed(block: &mut Block, value: ValueId, clamped: ValueId) -> ValueId {
 }
 
 /// Mapped duty and the flag that it was extrapolated.
-fn mapping(
-    scalar: Scalar,
-    block: &mut Block,
-    (output, map): (usize, &Mapping),
-    duty: ValueId,
-) -> (ValueId, ValueId) {
+fn mapping(scalar: Scalar, block: &mut Block, (output, map): (usize, &Mapping), duty: ValueId) -> (ValueId, ValueId) {
     let current = block.value(Op::Sanitised(map.load_current));
     let a = block.value(Op::Coefficient(output, Coefficient::A));
     let b = block.value(Op::Coefficient(output, Coefficient::B));

@@ -22,7 +22,8 @@ use crate::crc::{crc32_words, nibble_table};
 use crate::files::TOOL;
 use crate::output::Language;
 use crate::program::{
-    Coefficient, Conversion, Element, Head, HeadPart, Literal, MappingCode, OutputCode, Program, Provenance, SignalPort, Table,
+    Coefficient, Conversion, Element, Head, HeadPart, Literal, MappingCode, OutputCode, Program, Provenance,
+    SignalPort, Table,
 };
 
 /// Lowers a policy for a target; the loops of its network are those that suit the language's compilers.

@@ -26,7 +26,8 @@ pub(crate) use literal::{bits, words};
 pub use loops::{Add, Arithmetic, Buffer, Cut, From, Inner, IntegerCode, IntegerInput, Kept, Layer, Loop};
 pub use loops::{Network, Part, Piece, Shape, Sink, Store, Sums, Turns};
 pub use ops::{
-    Advance, Block, Coefficient, Conversion, Decide, Duty, Front, Op, Push, SignalPort, StateMember, StateValue, ValueId,
+    Advance, Block, Coefficient, Conversion, Decide, Duty, Front, Op, Push, SignalPort, StateMember, StateValue,
+    ValueId,
 };
 pub use tables::{Element, Slice, Strip, Table};
 
@@ -56,7 +57,9 @@ impl OutputCode {
     /// A name of generated code: `stem` where there is one output, `stem_left` of the output `left`.
     #[must_use]
     pub fn named(&self, stem: &str) -> String {
-        self.name.as_ref().map_or(stem.to_owned(), |name| format!("{stem}_{name}"))
+        self.name
+            .as_ref()
+            .map_or(stem.to_owned(), |name| format!("{stem}_{name}"))
     }
 }
 

@@ -42,14 +42,23 @@ pub(crate) fn are_given(document: &Document) -> bool {
 }
 
 /// The entries and what expressions may call; `several` is whether the reader of the policy takes more than one.
-pub(crate) fn names<'a>(root: &mut Table<'a>, taken: &mut Taken, several: bool, faults: &mut Sink) -> Option<Outputs<'a>> {
+pub(crate) fn names<'a>(
+    root: &mut Table<'a>,
+    taken: &mut Taken,
+    several: bool,
+    faults: &mut Sink,
+) -> Option<Outputs<'a>> {
     let value = root.optional("output")?;
     let items = value.list("[[output]] tables", faults)?;
     if !(2..=MAX_OUTPUTS).contains(&items.len()) {
         let message = catalogue::count("outputs", items.len(), 2, MAX_OUTPUTS);
-        faults.push(value.fault(message.hint(
-            "one output is written without [[output]]: [actions], [limits] and [fallback] at the top level",
-        )));
+        faults.push(
+            value.fault(
+                message.hint(
+                    "one output is written without [[output]]: [actions], [limits] and [fallback] at the top level",
+                ),
+            ),
+        );
         return None;
     }
     if !several {
@@ -192,7 +201,10 @@ fn disjoint(taken: &[(Value<'_>, std::ops::Range<usize>)], columns: usize, fault
     for (index, (item, own)) in taken.iter().enumerate() {
         let at = item.peek("column").unwrap_or_else(|| item.clone());
         let earlier = taken[..index].iter().map(|(_, other)| other);
-        if let Some(other) = earlier.clone().find(|other| own.start < other.end && other.start < own.end) {
+        if let Some(other) = earlier
+            .clone()
+            .find(|other| own.start < other.end && other.start < own.end)
+        {
             faults.push(at.fault(catalogue::columns_overlap(own, other)));
         } else if own.end > columns {
             faults.push(at.fault(catalogue::columns_outside(own, columns)));

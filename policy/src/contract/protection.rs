@@ -27,7 +27,9 @@ pub(crate) fn fallback(root: &mut Table<'_>, faults: &mut Sink) -> Option<Fallba
 /// The duty that one of several outputs falls back to.
 pub(crate) fn own_fallback(section: &mut Table<'_>, faults: &mut Sink) -> Option<f64> {
     let hint = "each output says what it commands without a usable measurement: `fallback = { duty = 0.0 }`";
-    let mut own = section.required("fallback", hint, faults)?.table("fallback of an output", faults)?;
+    let mut own = section
+        .required("fallback", hint, faults)?
+        .table("fallback of an output", faults)?;
     let duty = own.required("duty", hint, faults).and_then(|v| duty(&v, faults));
     own.finish_with(faults, |key| {
         (key == "hold").then(|| "samples are held for all outputs together: `hold` stands in [fallback]".to_owned())

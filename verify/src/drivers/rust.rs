@@ -223,7 +223,6 @@ fn is_same(a: &Command, b: &Command) -> bool {{
     )
 }
 
-
 /// The fields of a measurement from `words`.
 pub(super) fn measurement_fields(policy: &Policy) -> String {
     let mut fields = String::new();

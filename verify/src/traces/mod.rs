@@ -387,7 +387,9 @@ impl<'a> Stream<'a> {
 fn mapped(policy: &Policy) -> Vec<(usize, Mapping)> {
     let paths = policy.paths();
     let paths = paths.iter().enumerate();
-    paths.filter_map(|(index, path)| Some((index, *path.mapping?))).collect()
+    paths
+        .filter_map(|(index, path)| Some((index, *path.mapping?)))
+        .collect()
 }
 
 /// `x` in the unit of the signal as the sample that arrives in `scalar`: rounded, or the nearest ADC code.

@@ -11,7 +11,9 @@ use crate::program::{Coefficient, HeadPart, Literal, MappingCode, OutputCode, Pr
 pub fn parameters(program: &Program, mapping: Option<&MappingCode>) -> String {
     let kind = number::kind(program.scalar()).name;
     let coefficients = mapping.iter().flat_map(|mapping| &mapping.coefficients);
-    let all: Vec<String> = coefficients.map(|(name, ..)| format!("{kind} {}", name.name())).collect();
+    let all: Vec<String> = coefficients
+        .map(|(name, ..)| format!("{kind} {}", name.name()))
+        .collect();
     all.join(", ")
 }
 

@@ -97,13 +97,13 @@ fn header(program: &Program) -> Header {
     let count = |name: &str, value: usize| (name.to_owned(), format!("{value}u"));
     let period = ("SAMPLE_PERIOD".to_owned(), format!("{:?}", program.sample_period));
     let constants = vec![
-            count("SIGNALS", program.signals.len()),
-            count("FEATURES", program.feature_count()),
-            count("ACTIONS", program.head.outputs()),
-            count("STATE_WORDS", program.state_words()),
-            count("TABLE_NUMBERS", program.table_numbers()),
-            period,
-        ];
+        count("SIGNALS", program.signals.len()),
+        count("FEATURES", program.feature_count()),
+        count("ACTIONS", program.head.outputs()),
+        count("STATE_WORDS", program.state_words()),
+        count("TABLE_NUMBERS", program.table_numbers()),
+        period,
+    ];
     Header {
         common: common(program),
         constants: constants.into_iter().chain(duties::places(program)).collect(),

@@ -11,11 +11,7 @@ use crate::program::{Guarded, Place, Program, Within};
 
 /// The functions that compare, and the method that says whether the state is sound.
 pub fn method(program: &Program) -> TokenStream {
-    let terms = program
-        .guard
-        .numbers
-        .iter()
-        .map(|guarded| term(program, guarded));
+    let terms = program.guard.numbers.iter().map(|guarded| term(program, guarded));
     let most = Token::u32_suffixed(program.guard.bad_count);
     let top = match program.scalar() {
         Scalar::F32 => quote!(stray),

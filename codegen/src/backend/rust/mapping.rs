@@ -46,9 +46,14 @@ fn method(scalar: Scalar, output: &OutputCode, mapping: &MappingCode) -> TokenSt
         quote!(#name)
     });
     let [function, check_field] = ["set_mapping", "mapping_check"].map(|stem| ident(&output.named(stem)));
-    let of = output.name.as_ref().map_or(String::new(), |name| format!(" of the output `{name}`"));
+    let of = output
+        .name
+        .as_ref()
+        .map_or(String::new(), |name| format!(" of the output `{name}`"));
     let about = [
-        format!(" Replaces the coefficients of the duty ratio mapping{of}. False, changing nothing, if one is outside its"),
+        format!(
+            " Replaces the coefficients of the duty ratio mapping{of}. False, changing nothing, if one is outside its"
+        ),
         " interval or the mapping would not increase with the duty.".to_owned(),
     ];
     quote! {

@@ -143,7 +143,9 @@ fn types(program: &Program, layout: &TokenStream) -> TokenStream {
             " Duty of the law, before the mapping.",
             " Always 0: the network gives gains.",
         ],
-        Head::Choice(_) | Head::Several { .. } => [" Duty of the chosen action, before the mapping.", " Greedy action."],
+        Head::Choice(_) | Head::Several { .. } => {
+            [" Duty of the chosen action, before the mapping.", " Greedy action."]
+        }
     };
     let (duties, indices) = match program.has_several() {
         true => (quote!([#number; OUTPUTS]), quote!([u32; OUTPUTS])),

@@ -15,7 +15,14 @@ fn table(index: usize) -> Ident {
 /// Tables of duties, and argmax over some of the outputs; nothing where there is one duty.
 pub fn items(program: &Program) -> TokenStream {
     let kind = number::kind(program.scalar());
-    let choices = || program.head.parts().iter().enumerate().filter(|(_, part)| part.is_choice());
+    let choices = || {
+        program
+            .head
+            .parts()
+            .iter()
+            .enumerate()
+            .filter(|(_, part)| part.is_choice())
+    };
     if choices().next().is_none() {
         return TokenStream::new();
     }

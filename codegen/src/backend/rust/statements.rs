@@ -83,9 +83,7 @@ impl<'p> Printer<'p> {
             Op::PreviousDuty(output) => remembered(self.program, "previous_duty", *output),
             Op::PreviousCommand(output) => remembered(self.program, "previous_command", *output),
             Op::SoftCap(output) => remembered(self.program, "soft_cap", *output),
-            Op::Coefficient(output, name) => {
-                remembered(self.program, &format!("mapping_{}", name.name()), *output)
-            }
+            Op::Coefficient(output, name) => remembered(self.program, &format!("mapping_{}", name.name()), *output),
             Op::ChosenDuty(output) if self.program.has_several() => {
                 let name = ident(&format!("chosen{output}"));
                 quote!(#name)

@@ -2,6 +2,7 @@
 
 #[cfg(all(feature = "c", feature = "rust-text"))]
 pub mod bindings;
+mod command;
 mod controller;
 mod guard;
 mod integer;

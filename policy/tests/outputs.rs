@@ -210,5 +210,8 @@ fn one_output_is_written_without_a_list() {
     let (before, _) = CONTRACT.split_once("[actions]").unwrap();
     let (one, _) = OUTPUTS.split_once("[[output]]\nname = \"right\"").unwrap();
     let single = Folder::new().contract(&format!("{before}{one}[fallback]\nhold = 3\n"));
-    assert_says(&fault(&single), &["1 outputs", "[actions], [limits] and [fallback]"]);
+    assert_says(
+        &fault(&single),
+        &["too few outputs", "[actions], [limits] and [fallback]"],
+    );
 }

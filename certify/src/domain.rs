@@ -427,5 +427,10 @@ fn described(policy: &Policy, input: Input) -> (String, String, Interval) {
             let mut ends = [limits.low, limits.high].into_iter();
             ("previous_command".to_owned(), String::new(), duties(&mut ends))
         }
+        // contracts with several outputs are refused when they are read: no duty is outside of this
+        Input::OutputDuty(_) | Input::OutputCommand(_) => {
+            let name = input.name(&policy.signals, &policy.observers);
+            (name, String::new(), Interval { low: 0.0, high: 1.0 })
+        }
     }
 }

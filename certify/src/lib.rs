@@ -97,6 +97,24 @@ impl Certifier {
                     .collect();
                 vec![law::duty_bound(head, &outputs)]
             }
+            // what each output has: of a choice its Q values, of an actor its duty
+            Head::Several(all) => all
+                .iter()
+                .flat_map(|output| match &output.head {
+                    Head::Continuous(head) => {
+                        let at = output.column;
+                        vec![actor::duty_bound(
+                            head,
+                            enclosure.q_value(at),
+                            enclosure.error_bound(at),
+                        )]
+                    }
+                    own => {
+                        let columns = output.column..output.column + own.outputs();
+                        columns.map(|column| enclosure.error_bound(column)).collect()
+                    }
+                })
+                .collect(),
         })
     }
 

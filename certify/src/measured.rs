@@ -60,7 +60,8 @@ impl Certifier {
     fn duty_error(&self, real: &[f64], held: &[f64]) -> Option<f64> {
         let whole = real.len() == held.len();
         let error = match &self.head {
-            Head::Choice(_) | Head::Residual(_) => return None,
+            // contracts with several outputs are refused when they are read
+            Head::Choice(_) | Head::Residual(_) | Head::Several(_) => return None,
             _ if !whole => f64::INFINITY,
             Head::Continuous(head) => real
                 .iter()

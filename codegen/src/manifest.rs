@@ -123,6 +123,7 @@ pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
     }
     let bound = (policy.numeric_format.is_integer()).then(|| certify::Certifier::new(policy).box_bound().largest);
     let is_actor = !policy.head.is_choice();
+    let is_several = matches!(policy.head, policy::Head::Several(_));
     Sizes {
         signals: policy.signals.len(),
         features: policy.features.len(),
@@ -133,8 +134,9 @@ pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
         state_bytes: 4 * program.state_words(),
         accumulator_bound: program.network.integer().map(|code| code.accumulator_bound),
         removed_neurons: removed,
-        q_error_bound: bound.filter(|_| !is_actor),
-        duty_error_bound: bound.filter(|_| is_actor),
+        // of several outputs one figure would be of Q values and of duties at once
+        q_error_bound: bound.filter(|_| !is_actor && !is_several),
+        duty_error_bound: bound.filter(|_| is_actor && !is_several),
     }
 }
 

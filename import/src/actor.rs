@@ -1,6 +1,6 @@
 //! Continuous actors: the way from the last layer to a command, as the contract's `[actions]` says it.
 
-use policy::Activation;
+use policy::{Activation, DraftOutput};
 use toml_input::Message;
 
 /// What bounds the output of an actor.
@@ -22,6 +22,31 @@ pub(crate) struct Actor {
     pub squash: Squash,
     /// Scale and offset behind it; `None` where the file does not say them.
     pub affine: Option<(f64, f64)>,
+}
+
+/// One of several duties that a model commands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Duty {
+    /// A number.
+    Command(Actor),
+    /// A choice among so many duties.
+    Table(usize),
+}
+
+impl Duty {
+    /// The output in a contract to be filled in.
+    pub fn draft(self) -> DraftOutput {
+        match self {
+            Self::Command(actor) => DraftOutput {
+                actions: actor.entry(),
+                duties: actor.duties(),
+            },
+            Self::Table(actions) => DraftOutput {
+                actions: format!("duties = [{}]", vec!["\"TODO\""; actions].join(", ")),
+                duties: None,
+            },
+        }
+    }
 }
 
 /// The tanh of SAC, TD3 and DDPG.
@@ -151,11 +176,11 @@ pub(crate) fn short(x: f64) -> f64 {
 
 /// An actor with several commands.
 pub(crate) fn several(found: usize) -> Message {
-    Message::new("this actor commands several numbers, and one duty is compiled")
+    Message::new("this actor commands several numbers, and its file does not say what each of them is")
         .found(format!("{found} outputs"))
-        .expected("an action space of one number")
+        .expected("one number, or a model of stable-baselines3, whose action space has the ends of each: at most 16")
         .hint(
-            "say --output N if one of them is the duty: the others are left out, and of several legs each gets a controller of its own; say \
-             --gains if they are the gains of a law",
+            "say --output N if one of them is the duty: the others are left out; say --gains if they are the gains of a law. A contract for \
+             all of them has [[output]] in the place of [actions]",
         )
 }

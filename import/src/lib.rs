@@ -46,7 +46,8 @@ pub struct Options {
     pub actions: Option<usize>,
     /// The entry of a checkpoint that holds the network.
     pub inside: Option<String>,
-    /// Which output of several is the duty, or which dimension of a MultiDiscrete; the others are left out.
+    /// Which output of several is the duty, or which dimension of a MultiDiscrete; the others are left out. Without it all are
+    /// kept, where the file says what each is.
     pub output: Option<usize>,
     /// The outputs are the gains of a law: all of them are kept.
     pub gains: bool,
@@ -95,6 +96,10 @@ pub fn new_policy(file: impl Into<FileName>, contract: &Path, options: &Options)
         }
         let features = if own.is_empty() { graph.features.clone() } else { own };
         return written(&name, contract, &loaded, &graph.network, &features, options);
+    }
+    if let (false, Some(network)) = (loaded.several.is_empty(), loaded.actor_network()) {
+        let statistics = statistics(&name, options)?;
+        return written(&name, contract, &loaded, &network, &statistics, options);
     }
     if let (Some(_), Some(network)) = (loaded.actor, loaded.actor_network()) {
         let outputs = network.layers.last().map_or(0, |layer| layer.outputs);
@@ -163,8 +168,14 @@ fn written(
     let outputs = network.layers.last().map_or(0, |layer| layer.outputs);
     // gains and one command are answered with other tensors than the values of actions
     let actions = (outputs > 1 && !options.gains).then_some(outputs);
-    let given = given_answers(name, inputs, actions)?;
+    // golden answers are compared for one output
+    let has_several = !loaded.several.is_empty();
+    let given = match has_several {
+        true => None,
+        false => given_answers(name, inputs, actions)?,
+    };
     let golden = match given {
+        _ if has_several => None,
         Some(_) => None,
         None => golden_answers(loaded, network, statistics).map_err(|message| name.fault(message))?,
     };
@@ -178,6 +189,12 @@ fn written(
         false => Vec::new(),
     };
     said.extend(actor.filter(|_| gains.is_empty()).map(actor::Actor::said));
+    if has_several {
+        let count = loaded.several.len();
+        said.push(format!(
+            "{count} outputs, each a duty of its own; `policyc new MODEL --output N` makes a contract for one of them, with golden answers"
+        ));
+    }
     said.extend(definition.iter().flat_map(|definition| definition.said.iter().cloned()));
     if !statistics.is_empty() && loaded.graph.as_ref().is_none_or(|graph| graph.features.is_empty()) {
         said.push("VecNormalize: scale = 1/sqrt(var + epsilon), offset = -mean/sqrt(var + epsilon), then clip, all computed in f64".to_owned());
@@ -209,6 +226,7 @@ fn written(
         continuous: actor.map(actor::Actor::entry),
         duties: actor.filter(|_| gains.is_empty()).and_then(actor::Actor::duties),
         gains,
+        several: loaded.several.iter().map(|duty| duty.draft()).collect(),
         about: said.clone(),
         features: match definition {
             _ if !statistics.is_empty() => statistics.to_vec(),

@@ -4,7 +4,7 @@ use policy::{Activation, NamedTensor};
 use toml_input::{Faults, FileName, Message};
 
 use crate::activations::Parameters;
-use crate::actor::Actor;
+use crate::actor::{Actor, Duty};
 use crate::network::{Layer, Network};
 use crate::recognise::{self, Known};
 use crate::zip::Archive;
@@ -24,6 +24,8 @@ pub(crate) struct Loaded {
     pub about: Vec<String>,
     /// Each command of a model whose outputs are gains.
     pub commands: Vec<Actor>,
+    /// What each of several duties is; the network is that of `original`.
+    pub several: Vec<Duty>,
     /// The command is a number; the network is that of `original`, or of the graph.
     pub actor: Option<Actor>,
     /// A graph needs no recognition: its network, activations and features.
@@ -157,6 +159,7 @@ fn model(archive: &Archive<'_>, options: &Options) -> Result<Loaded, Message> {
         original: model.original,
         about: model.about,
         commands: model.commands,
+        several: model.several,
         actor: model.actor,
         graph: None,
     })

@@ -11,7 +11,7 @@ use toml_input::Message;
 
 use crate::Options;
 use crate::activations;
-use crate::actor::Actor;
+use crate::actor::{Actor, Duty};
 use crate::network::Layer;
 use crate::numpy;
 use crate::pickle::{Item, Pickle};
@@ -35,6 +35,8 @@ pub(crate) struct Model {
     pub actor: Option<Actor>,
     /// Each command, where the outputs are gains.
     pub commands: Vec<Actor>,
+    /// What each of several duties is.
+    pub several: Vec<Duty>,
 }
 
 /// A policy class that is read: where its layers lie, and its activation unless `policy_kwargs` has another.
@@ -153,6 +155,7 @@ pub(crate) fn read(archive: &Archive<'_>, options: &Options) -> Result<Model, Me
         original,
         actor: space.commands.first().copied(),
         commands: space.commands,
+        several: space.several,
     })
 }
 

@@ -45,16 +45,16 @@ fn assert_columns(policy: &policy::Policy, columns: std::ops::Range<usize>) {
 }
 
 #[test]
-fn a_multidiscrete_is_refused_until_its_dimension_is_said() {
-    let faults = refusal(&fixture("sb3_multidiscrete.zip"));
-    for part in [
-        "several tables of actions",
-        "[2, 3]",
-        "--output N",
-        "one Discrete table",
-    ] {
-        assert!(faults.contains(part), "{part}: {faults}");
-    }
+fn a_multidiscrete_becomes_a_choice_for_each_dimension() {
+    let (_folder, new, policy) = policy_of("sb3_multidiscrete.zip", &Options::default());
+    let widths: Vec<_> = policy
+        .paths()
+        .iter()
+        .map(|path| (path.columns(), path.head.is_choice()))
+        .collect();
+    assert_eq!(widths, [(0..2, true), (2..5, true)]);
+    assert!(new.contract.contains("5 outputs for 2 duties"), "{}", new.contract);
+    assert_columns(&policy, 0..5);
     let faults = refused("sb3_multidiscrete.zip", &output(2));
     assert!(
         faults.contains("--output names none") && faults.contains("0 to 1"),
@@ -62,6 +62,28 @@ fn a_multidiscrete_is_refused_until_its_dimension_is_said() {
     );
     let faults = refused("sb3_dqn.zip", &output(0));
     assert!(faults.contains("one table of actions"), "{faults}");
+}
+
+#[test]
+fn several_commands_of_sb3_become_outputs_with_their_own_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("policy.toml");
+    let mut new = import::new_policy(&fixture("sb3_several.zip"), &path, &Options::default()).unwrap();
+    for entry in [
+        "5 outputs for 5 duties",
+        "clip = [0.1, 0.85] }   # check: the command is 0.1 to 0.85",
+        "own command is -1.0 to 1.0",
+        "duty = [0.0, 0.05]",
+    ] {
+        assert!(new.contract.contains(entry), "{entry}\n{}", new.contract);
+    }
+    let open = "scale = \"TODO\", offset = \"TODO\"";
+    new.contract = new.contract.replace(open, "scale = 0.01, offset = 0.5");
+    let policy = common::filled(folder.path(), &new);
+    let columns: Vec<_> = policy.paths().iter().map(|path| path.columns()).collect();
+    assert_eq!(columns, [0..1, 1..2, 2..3, 3..4, 4..5]);
+    assert_eq!(policy.output_names(), ["u0", "u1", "u2", "u3", "u4"]);
+    assert_columns(&policy, 0..5);
 }
 
 #[test]
@@ -83,11 +105,6 @@ fn of_a_multidiscrete_the_logits_of_one_dimension_are_kept() {
 
 #[test]
 fn of_several_commands_of_sb3_one_is_kept_with_its_own_ends() {
-    let faults = refusal(&fixture("sb3_several.zip"));
-    assert!(
-        faults.contains("commands several numbers") && faults.contains("--output N"),
-        "{faults}"
-    );
     let (_folder, new, policy) = policy_of("sb3_several.zip", &output(0));
     assert!(
         new.contract

@@ -7,17 +7,15 @@ use policy::Policy;
 
 use crate::feature::{Feature, Inputs};
 use crate::head::{Base, Head};
-use crate::limits::Limits;
-use crate::mapping::Mapping;
 use crate::names::state_names;
 use crate::network::Network;
 use crate::observer::{Measured, Observer};
+use crate::path::{self, Path};
 use crate::real::Real;
 use crate::sanitise::{InputError, Sample, Signal};
 use crate::sound::Sound;
-use crate::state::{Coefficients, State};
-use crate::status;
-use crate::trace::{Command, FeatureTrace, Trace};
+use crate::state::{Coefficients, Remembered, State};
+use crate::trace::{Command, Decision, FeatureTrace, Trace};
 
 /// A policy at work, in the number format `T`.
 #[derive(Debug, Clone)]
@@ -27,11 +25,8 @@ pub struct Controller<T> {
     observers: Arc<[Observer<T>]>,
     features: Arc<[Feature<T>]>,
     network: Arc<Network<T>>,
-    head: Arc<Head<T>>,
-    pub(crate) mapping: Option<Mapping<T>>,
-    limits: Limits<T>,
-    initial_duty: T,
-    fallback: T,
+    /// At least one; of several outputs each.
+    pub(crate) paths: Arc<[Path<T>]>,
     /// K: bad steps bridged.
     hold: u32,
     pub(crate) sound: Arc<Sound<T>>,
@@ -59,31 +54,15 @@ impl<T: Real> Controller<T> {
             })
             .collect();
         let signals: Vec<Signal<T>> = policy.signals.iter().map(Signal::new).collect();
-        let mapping = policy.mapping.as_ref().map(Mapping::new);
-        let limits = Limits::new(&policy.limits);
-        let initial_duty = T::nearest(policy.limits.initial_duty);
-        let state = State {
-            held: signals.iter().map(Signal::nearest_to_zero).collect(),
-            memory: vec![T::ZERO; words],
-            previous_duty: initial_duty,
-            previous_command: initial_duty,
-            soft_cap: limits.soft_start.map(|soft| soft.from),
-            mapping: mapping.as_ref().map(|mapping| mapping.initial),
-            mapping_check: mapping.as_ref().map(|mapping| mapping.initial.check_word()),
-            bad_count: 0,
-            primed: 0,
-        };
+        let paths: Vec<Path<T>> = policy.paths().iter().map(Path::new).collect();
+        let state = start(&signals, words, &paths, |_| None);
         Self {
             state_names: state_names(policy, &features, &state).into(),
             signals: signals.into(),
             observers: observers.into(),
             features: features.into(),
             network: Network::new(policy).into(),
-            head: Head::new(policy).into(),
-            mapping,
-            limits,
-            initial_duty,
-            fallback: T::nearest(policy.fallback.duty),
+            paths: paths.into(),
             hold: policy.fallback.hold,
             sound: Sound::new(policy).into(),
             state,
@@ -92,23 +71,19 @@ impl<T: Real> Controller<T> {
 
     /// The state of `new`, except that the mapping coefficients in use are kept.
     pub fn reset(&mut self) {
-        self.state = State {
-            held: self.signals.iter().map(Signal::nearest_to_zero).collect(),
-            memory: vec![T::ZERO; self.state.memory.len()],
-            previous_duty: self.initial_duty,
-            previous_command: self.initial_duty,
-            soft_cap: self.limits.soft_start.map(|soft| soft.from),
-            mapping: self.state.mapping,
-            // not computed anew: a damaged coefficient would pass for a good one
-            mapping_check: self.state.mapping_check,
-            bad_count: 0,
-            primed: 0,
-        };
+        let kept = |index| Some(self.state.output(index));
+        self.state = start(&self.signals, self.state.memory.len(), &self.paths, kept);
     }
 
     /// Outputs of the network.
     pub(crate) fn outputs(&self) -> usize {
-        self.head.outputs()
+        self.paths.iter().map(|path| path.head.outputs()).sum()
+    }
+
+    /// What the outputs mean where there is one duty; of several those of the first.
+    fn head(&self) -> &Head<T> {
+        // a policy has at least one output, and `paths` one for each
+        &self.paths[0].head
     }
 
     /// What the controller remembers.
@@ -141,14 +116,11 @@ impl<T: Real> Controller<T> {
         if let Some(last) = trace.layers.last() {
             trace.q_values.assign(&last.post_activation);
         }
-        let scheduled = self.head.scheduled(trace.base, &trace.factors, trace.q_values.view());
-        (trace.action_index, trace.duty_sim) = match scheduled {
-            Some(duty) => (0, duty),
-            None => {
-                let (index, chosen) = self.head.decide(trace.q_values.view());
-                (index, self.head.duty(trace.base, chosen))
-            }
-        };
+        for (index, path) in self.paths.iter().enumerate() {
+            let mut decision = trace.decision(index);
+            (decision.action_index, decision.duty_sim) = path.decided(trace);
+            trace.set_decision(index, decision);
+        }
         self.act(trace);
         Ok(())
     }
@@ -158,9 +130,18 @@ impl<T: Real> Controller<T> {
     /// The sanitised signals and filter values are recomputed from state and samples; only `duty` and `duty_sim` are
     /// taken from the command.
     pub fn commit(&mut self, samples: &[Sample], command: &Command<T>) -> Result<(), InputError> {
+        self.commit_all(samples, std::slice::from_ref(command))
+    }
+
+    /// [`Controller::commit`] with a command for each of several outputs, in their order.
+    pub fn commit_all(&mut self, samples: &[Sample], commands: &[Command<T>]) -> Result<(), InputError> {
+        let (expected, found) = (self.paths.len(), commands.len());
+        if expected != found {
+            return Err(InputError::CommandCount { expected, found });
+        }
         let mut trace = self.blank_trace();
         self.sense(samples, &mut trace)?;
-        self.absorb(&trace, command);
+        self.absorb(&trace, commands.iter().copied());
         Ok(())
     }
 
@@ -174,7 +155,7 @@ impl<T: Real> Controller<T> {
     /// [`Controller::step`] into a trace made by [`Controller::blank_trace`] of the same policy: allocates nothing.
     pub fn step_into(&mut self, samples: &[Sample], trace: &mut Trace<T>) -> Result<(), InputError> {
         self.eval_into(samples, trace)?;
-        self.absorb(trace, &trace.command);
+        self.absorb(trace, trace.commands());
         Ok(())
     }
 
@@ -198,10 +179,10 @@ impl<T: Real> Controller<T> {
     /// beyond the last action counts as the last. A head without a choice has no actions to choose from: the initial duty is
     /// commanded.
     pub fn choose(&self, trace: &mut Trace<T>, action_index: u32) {
-        let chosen = self.head.choose(action_index);
+        let chosen = self.head().choose(action_index);
         (trace.action_index, trace.duty_sim) = match chosen {
-            Some((index, chosen)) => (index, self.head.duty(trace.base, chosen)),
-            None => (0, self.initial_duty),
+            Some((index, chosen)) => (index, self.head().duty(trace.base, chosen)),
+            None => (0, self.paths[0].initial_duty),
         };
         self.act(trace);
     }
@@ -215,16 +196,15 @@ impl<T: Real> Controller<T> {
 
     /// [`Controller::commit`] of a trace of this very step, with its command; allocates nothing.
     pub fn commit_trace(&mut self, trace: &Trace<T>) {
-        self.absorb(trace, &trace.command);
+        self.absorb(trace, trace.commands());
     }
 
     /// Puts back a state that [`Controller::state`] gave; `false` and no change if it is of another shape.
     pub fn restore(&mut self, state: &State<T>) -> bool {
         let fits = state.held.len() == self.state.held.len()
             && state.memory.len() == self.state.memory.len()
-            && state.soft_cap.is_some() == self.state.soft_cap.is_some()
-            && state.mapping.map(|m| m.r.is_some()) == self.state.mapping.map(|m| m.r.is_some())
-            && state.mapping_check.is_some() == self.state.mapping_check.is_some();
+            && state.others.len() == self.state.others.len()
+            && (0..state.outputs()).all(|index| state.output(index).is_like(&self.state.output(index)));
         if fits {
             self.state.clone_from(state);
         }
@@ -246,15 +226,16 @@ impl<T: Real> Controller<T> {
     }
 
     /// Action index and duty before the mapping of a network's outputs (sections 7 and 7b), as many as there are; of a residual
-    /// head the offset, since its law needs a measurement. `None` of a gain schedule too, whose duty needs one: [`Self::gains`].
+    /// head the offset, since its law needs a measurement. `None` of several outputs, and of a gain schedule too, whose duty needs one: [`Self::gains`].
     pub fn decide(&self, outputs: &ArrayView1<'_, T>) -> Option<(u32, T)> {
-        let decides = outputs.len() == self.head.outputs() && !matches!(*self.head, Head::Schedule(_));
-        decides.then(|| self.head.decide(*outputs))
+        let is_one = self.paths.len() == 1 && outputs.len() == self.head().outputs();
+        let decides = is_one && !matches!(self.head(), Head::Schedule(_));
+        decides.then(|| self.head().decide(*outputs))
     }
 
     /// The gains that a gain schedule makes of a network's outputs (section 7c), as many as there are; `None` of any other head.
     pub fn gains(&self, outputs: &ArrayView1<'_, T>) -> Option<Vec<T>> {
-        match &*self.head {
+        match self.head() {
             Head::Schedule(head) if head.gains().len() == outputs.len() => {
                 let both = head.gains().iter().zip(outputs);
                 Some(both.map(|(gain, output)| gain.of(*output)).collect())
@@ -266,11 +247,22 @@ impl<T: Real> Controller<T> {
     /// Replaces the mapping coefficients if the contract allows them (section 8); `false` and no change otherwise,
     /// also without a mapping or with `r` against the mapping's form.
     pub fn set_mapping(&mut self, a: T, b: T, c: T, r: Option<T>) -> bool {
-        let new = Coefficients { a, b, c, r };
-        let accepted = self.mapping.as_ref().is_some_and(|mapping| mapping.accepts(new));
+        self.set_mapping_of(0, Coefficients { a, b, c, r })
+    }
+
+    /// [`Controller::set_mapping`] of the output of that index.
+    pub fn set_mapping_of(&mut self, output: usize, new: Coefficients<T>) -> bool {
+        let mapping = self.paths.get(output).and_then(|path| path.mapping.as_ref());
+        let accepted = mapping.is_some_and(|mapping| mapping.accepts(new));
         if accepted {
-            self.state.mapping = Some(new);
-            self.state.mapping_check = Some(new.check_word());
+            let own = self.state.output(output);
+            let (mapping, mapping_check) = (Some(new), Some(new.check_word()));
+            let own = Remembered {
+                mapping,
+                mapping_check,
+                ..own
+            };
+            self.state.set_output(output, own);
         }
         accepted
     }
@@ -300,8 +292,8 @@ impl<T: Real> Controller<T> {
             observation: Array1::from_elem(self.features.len(), T::ZERO),
             layers: self.network.blank(),
             base: Base::default(),
-            factors: vec![T::ZERO; self.head.factor_count()],
-            q_values: Array1::from_elem(self.head.outputs(), T::ZERO),
+            factors: vec![T::ZERO; self.head().factor_count()],
+            q_values: Array1::from_elem(self.outputs(), T::ZERO),
             action_index: 0,
             duty_sim: T::ZERO,
             mapped: T::ZERO,
@@ -310,6 +302,7 @@ impl<T: Real> Controller<T> {
             limited: T::ZERO,
             computed_status: 0,
             command: Command::default(),
+            others: vec![Decision::default(); self.paths.len() - 1],
         }
     }
 
@@ -358,12 +351,13 @@ impl<T: Real> Controller<T> {
             estimates: &trace.estimates,
             previous_duty: state.previous_duty,
             previous_command: state.previous_command,
+            others: &state.others,
         };
-        trace.base = self.head.base(inputs);
+        trace.base = self.head().base(inputs);
         for (feature, feature_trace) in self.features.iter().zip(&mut trace.features) {
             feature.filter(inputs, &state.memory, trace.primed, feature_trace);
         }
-        self.head.factors(inputs, &trace.features, &mut trace.factors);
+        self.head().factors(inputs, &trace.features, &mut trace.factors);
         Ok(())
     }
 
@@ -380,57 +374,13 @@ impl<T: Real> Controller<T> {
         }
     }
 
-    /// Sections 8 and 9, from the chosen duty to the command.
+    /// Sections 8, 9 and 9b, from the chosen duties to the commands.
     fn act(&self, trace: &mut Trace<T>) {
-        let state = &self.state;
-        let d = trace.duty_sim;
-        let mut bits = if trace.features.iter().any(|feature| feature.clipped) {
-            status::CLIPPED
-        } else {
-            0
-        };
-        let mut t = d;
-        if let (Some(mapping), Some(coefficients)) = (&self.mapping, state.mapping) {
-            let i = trace.signals[mapping.load_current];
-            t = Mapping::apply(coefficients, d, i);
-            bits |= if mapping.outside(d, i) {
-                status::MAPPING_RANGE
-            } else {
-                0
-            };
-        }
-        let limited = self.limits.apply(t, state.previous_command, state.soft_cap);
-        bits |= limited.status;
-
-        trace.mapped = t;
-        trace.slewed = limited.slewed;
-        trace.soft_started = limited.soft_started;
-        trace.limited = limited.limited;
-        trace.computed_status = bits;
-        let action_index = trace.action_index;
-        // what cannot come out of a sound state is no reason to command it
-        let is_number = self.limits.contains(limited.limited);
-        trace.command = if trace.usable && is_number {
-            let held = if trace.all_valid { 0 } else { status::HELD };
-            let primes = if trace.primed { 0 } else { status::PRIMED };
-            Command {
-                duty: limited.limited,
-                duty_sim: d,
-                action_index,
-                status: bits | held | primes,
-            }
-        } else {
-            Command {
-                duty: self.fallback,
-                duty_sim: self.fallback,
-                action_index: if trace.sound && is_number { action_index } else { 0 },
-                status: status::FALLBACK | if trace.sound && is_number { 0 } else { status::STATE },
-            }
-        };
+        path::act(&self.paths, |index| self.state.output(index), trace);
     }
 
     /// Section 10.
-    fn absorb(&mut self, trace: &Trace<T>, command: &Command<T>) {
+    fn absorb(&mut self, trace: &Trace<T>, commands: impl Iterator<Item = Command<T>>) {
         let state = &mut self.state;
         state.held.copy_from_slice(&trace.signals);
         for (observer, estimates) in self.observers.iter().zip(&trace.estimates) {
@@ -442,12 +392,34 @@ impl<T: Real> Controller<T> {
         if !trace.sound {
             state.memory.fill(T::ZERO);
         }
-        state.previous_duty = command.duty_sim;
-        state.previous_command = command.duty;
-        if let (Some(soft), Some(cap)) = (self.limits.soft_start, state.soft_cap) {
-            state.soft_cap = Some(self.limits.next_cap(soft, cap, trace.usable));
+        for ((index, path), command) in self.paths.iter().enumerate().zip(commands) {
+            state.set_output(index, path.next(state.output(index), &command, trace.usable));
         }
         state.bad_count = if trace.sound { trace.bad_count } else { 0 }; // it may be the damaged word
         state.primed = if trace.sound { u32::from(trace.usable) } else { 2 }; // 2: seen until init or reset
+    }
+}
+
+/// The state of section 1 before the first step; `kept` are the coefficients of each output that a reset keeps.
+fn start<T: Real>(
+    signals: &[Signal<T>],
+    words: usize,
+    paths: &[Path<T>],
+    kept: impl Fn(usize) -> Option<Remembered<T>>,
+) -> State<T> {
+    let mut outputs = paths.iter().enumerate().map(|(index, path)| path.start(kept(index)));
+    let first = outputs.next();
+    let initial = paths.first().map_or(T::ZERO, |path| path.initial_duty);
+    State {
+        held: signals.iter().map(Signal::nearest_to_zero).collect(),
+        memory: vec![T::ZERO; words],
+        previous_duty: initial,
+        previous_command: initial,
+        soft_cap: first.and_then(|first| first.soft_cap),
+        mapping: first.and_then(|first| first.mapping),
+        mapping_check: first.and_then(|first| first.mapping_check),
+        others: outputs.collect(),
+        bad_count: 0,
+        primed: 0,
     }
 }

@@ -109,7 +109,7 @@ fn found(policy: &Policy, golden: &Golden) -> Vec<f64> {
 
 fn in_format<T: Real>(policy: &Policy, golden: &Golden) -> Vec<f64> {
     let controller = Controller::<T>::new(policy);
-    let head = Head::<T>::new(policy);
+    let head = Head::<T>::new(&policy.head);
     let answers = answers(&controller, golden);
     answers
         .iter()

@@ -4,6 +4,7 @@ use policy::{Expr, Input};
 
 use crate::filter::Filter;
 use crate::real::{Range, Real};
+use crate::state::Remembered;
 use crate::trace::FeatureTrace;
 
 /// What a source expression can read.
@@ -13,6 +14,8 @@ pub(crate) struct Inputs<'a, T> {
     pub estimates: &'a [[T; 4]],
     pub previous_duty: T,
     pub previous_command: T,
+    /// Of the outputs behind the first.
+    pub others: &'a [Remembered<T>],
 }
 
 /// A source expression with its constants rounded to the format.
@@ -45,8 +48,10 @@ impl<T: Real> Source<T> {
         match self {
             Self::Input(Input::Signal(index)) => inputs.signals[*index],
             Self::Input(Input::Estimate(index, estimate)) => inputs.estimates[*index][*estimate as usize],
-            Self::Input(Input::PreviousDuty) => inputs.previous_duty,
-            Self::Input(Input::PreviousCommand) => inputs.previous_command,
+            Self::Input(Input::PreviousDuty | Input::OutputDuty(0)) => inputs.previous_duty,
+            Self::Input(Input::PreviousCommand | Input::OutputCommand(0)) => inputs.previous_command,
+            Self::Input(Input::OutputDuty(index)) => inputs.others[*index - 1].previous_duty,
+            Self::Input(Input::OutputCommand(index)) => inputs.others[*index - 1].previous_command,
             Self::Constant(value) => *value,
             _ => self.tree(inputs),
         }
@@ -170,6 +175,7 @@ mod tests {
                 estimates: &[],
                 previous_duty: 0.25,
                 previous_command: 0.75,
+                others: &[],
             },
             &[],
             false,

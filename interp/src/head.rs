@@ -1,7 +1,7 @@
 //! From the outputs of the network to a duty (contract sections 7, 7b, 7c and 8).
 
 use ndarray::ArrayView1;
-use policy::{Factor, Policy, Squash};
+use policy::{Factor, Squash};
 
 use crate::activation::activate;
 use crate::feature::{Inputs, Source};
@@ -85,8 +85,8 @@ pub(crate) struct Continuous<T> {
 }
 
 impl<T: Real> Head<T> {
-    pub fn new(policy: &Policy) -> Self {
-        match &policy.head {
+    pub fn new(head: &policy::Head) -> Self {
+        match head {
             policy::Head::Choice(actions) => {
                 Self::Choice(actions.iter().map(|action| T::nearest(action.duty)).collect())
             }
@@ -118,6 +118,8 @@ impl<T: Real> Head<T> {
                 gains: head.gains.iter().map(Gain::new).collect(),
                 limits: Range::inwards(head.limits),
             }),
+            // an output has one of the others: `Policy::paths` takes this apart
+            policy::Head::Several(_) => Self::Choice(Vec::new()),
         }
     }
 

@@ -11,7 +11,7 @@
 //! | 6, 7 network, argmax | `network`; in integers `integer` |
 //! | 7, 7b, 7c argmax, continuous head, gain schedule | `head` |
 //! | 8 action, mapping | `mapping` |
-//! | 9 limits and status | `limits`, [`status`] |
+//! | 9, 9b limits and status, several outputs | `limits`, `path`, [`status`] |
 //! | 10 commit | [`controller`] |
 //!
 //! [`golden`] and [`decisions`] hold its answers against the trainer's.
@@ -42,6 +42,7 @@ mod mapping;
 mod names;
 mod network;
 mod observer;
+mod path;
 mod real;
 mod refusal;
 mod sanitise;
@@ -55,5 +56,5 @@ pub use controller::Controller;
 pub use network::argmax;
 pub use real::Real;
 pub use sanitise::{InputError, Sample};
-pub use state::{Coefficients, State};
-pub use trace::{Command, FeatureTrace, LayerTrace, Trace};
+pub use state::{Coefficients, Remembered, State};
+pub use trace::{Command, Decision, FeatureTrace, LayerTrace, Trace};

@@ -29,13 +29,19 @@ pub(crate) fn state_names<T: Real>(policy: &Policy, features: &[Feature<T>], sta
             );
         }
     }
-    names.extend(["previous_duty", "previous_command"].map(str::to_owned));
-    names.extend(state.soft_cap.map(|_| "soft_cap".to_owned()));
-    if let Some(coefficients) = &state.mapping {
-        names.extend(["mapping.a", "mapping.b", "mapping.c"].map(str::to_owned));
-        names.extend(coefficients.r.map(|_| "mapping.r".to_owned()));
-        names.push("mapping.check".to_owned());
+    let mut checks = Vec::new();
+    for (index, path) in policy.paths().into_iter().enumerate() {
+        let named = |part: &str| path.name.map_or(part.to_owned(), |name| format!("{name}.{part}"));
+        let own = state.output(index);
+        names.extend(["previous_duty", "previous_command"].map(named));
+        names.extend(own.soft_cap.map(|_| named("soft_cap")));
+        if let Some(coefficients) = &own.mapping {
+            names.extend(["mapping.a", "mapping.b", "mapping.c"].map(named));
+            names.extend(coefficients.r.map(|_| named("mapping.r")));
+            checks.push(named("mapping.check"));
+        }
     }
+    names.extend(checks);
     names.extend(["bad_count", "primed"].map(str::to_owned));
     names
 }

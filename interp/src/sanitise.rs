@@ -36,6 +36,13 @@ pub enum InputError {
         /// Index of the signal.
         signal: usize,
     },
+    /// One command per output is needed.
+    CommandCount {
+        /// Number of outputs of the policy.
+        expected: usize,
+        /// Number of commands given.
+        found: usize,
+    },
     /// The observation must have one value per feature.
     ObservationLength {
         /// Number of features of the policy.
@@ -54,6 +61,9 @@ impl fmt::Display for InputError {
             Self::CodeExpected { signal } => write!(f, "signal {signal}: expected an ADC code, found a physical value"),
             Self::PhysicalExpected { signal } => {
                 write!(f, "signal {signal}: expected a physical value, found an ADC code")
+            }
+            Self::CommandCount { expected, found } => {
+                write!(f, "expected {expected} commands, one per output, found {found}")
             }
             Self::ObservationLength { expected, found } => {
                 write!(f, "expected an observation of {expected} values, found {found}")

@@ -102,4 +102,61 @@ pub struct Trace<T> {
     pub computed_status: u32,
     /// What leaves the controller.
     pub command: Command<T>,
+    /// The same of several outputs, without the first (9b); empty where there is one.
+    pub others: Vec<Decision<T>>,
+}
+
+/// From the network to a command, of one output of several; the fields are those of [`Trace`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Decision<T> {
+    /// Greedy action.
+    pub action_index: u32,
+    /// Duty before the mapping.
+    pub duty_sim: T,
+    /// After the mapping.
+    pub mapped: T,
+    /// After the slew limit.
+    pub slewed: T,
+    /// After the soft start.
+    pub soft_started: T,
+    /// After the duty limits.
+    pub limited: T,
+    /// What leaves the controller; its status is that of all outputs.
+    pub command: Command<T>,
+}
+
+impl<T: Copy> Trace<T> {
+    /// What was decided for the output of that index; for the first where there is no such one.
+    pub(crate) fn decision(&self, index: usize) -> Decision<T> {
+        let other = index.checked_sub(1).and_then(|index| self.others.get(index));
+        other.copied().unwrap_or(Decision {
+            action_index: self.action_index,
+            duty_sim: self.duty_sim,
+            mapped: self.mapped,
+            slewed: self.slewed,
+            soft_started: self.soft_started,
+            limited: self.limited,
+            command: self.command,
+        })
+    }
+
+    pub(crate) fn set_decision(&mut self, index: usize, to: Decision<T>) {
+        match index.checked_sub(1) {
+            None => {
+                (self.action_index, self.duty_sim) = (to.action_index, to.duty_sim);
+                (self.mapped, self.slewed, self.soft_started) = (to.mapped, to.slewed, to.soft_started);
+                (self.limited, self.command) = (to.limited, to.command);
+            }
+            Some(index) => {
+                if let Some(other) = self.others.get_mut(index) {
+                    *other = to;
+                }
+            }
+        }
+    }
+
+    /// What leaves the controller, output by output.
+    pub fn commands(&self) -> impl Iterator<Item = Command<T>> {
+        std::iter::once(self.command).chain(self.others.iter().map(|other| other.command))
+    }
 }

@@ -128,7 +128,11 @@ impl Build {
     fn checked(&self, surroundings: &Surroundings) -> Result<(Policy, &'static TargetSpec), Error> {
         let target = self.find_target(&surroundings.triple)?;
         // cargo runs a script that failed again, so that the files of a policy with faults need no line
-        let policy = policy::load(&self.contract)?;
+        let options = policy::ReadOptions {
+            several_outputs: true,
+            ..policy::ReadOptions::default()
+        };
+        let policy = policy::load_with(&self.contract, &options)?;
         // as `policyc compile` does: who never types `policyc` must not get the controller of a misread network
         if let Some(message) = interp::golden::refusal(&policy) {
             return Err(policy::Faults::refusing(&policy, message).into());

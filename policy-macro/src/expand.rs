@@ -129,7 +129,10 @@ pub fn expand(input: TokenStream) -> TokenStream {
 }
 
 fn load(root: &Path, path: &str) -> Result<Policy, Faults> {
-    let options = ReadOptions::within(root);
+    let options = ReadOptions {
+        several_outputs: true,
+        ..ReadOptions::within(root)
+    };
     let policy = policy::check(policy::read(&root.join(path), &options)?)?;
     match interp::golden::refusal(&policy) {
         None => Ok(policy),

@@ -19,7 +19,7 @@ pub(crate) use observer::observer;
 
 use crate::activation::{Activation, Shape};
 use crate::limits::MAX_MAGNITUDE;
-use crate::model::{Estimate, Expr, Fallback, Filter, Input, Interval, Limits, Observer, Signal};
+use crate::model::{Estimate, Expr, Fallback, Filter, Input, Interval, Limits, Observer, Output, Signal};
 use crate::rounding::{inward_f32, nearest_f32};
 
 /// Closed interval of binary32 values.
@@ -139,6 +139,8 @@ pub(crate) struct Inputs {
     signals: Vec<Box32>,
     previous_duty: Box32,
     previous_command: Box32,
+    /// The same of each of several outputs.
+    outputs: Vec<[Box32; 2]>,
     estimates: Vec<[Box32; 4]>,
 }
 
@@ -148,6 +150,7 @@ impl Inputs {
         signals: &[Signal],
         observers: &[Observer],
         duties: &[f64],
+        outputs: &[Output],
         limits: &Limits,
         fallback: &Fallback,
     ) -> Self {
@@ -156,13 +159,22 @@ impl Inputs {
             let (low, high) = inward_f32(interval).unwrap_or((0.0, 0.0));
             Box32 { low, high }
         };
-        // `init` writes the initial duty; the fallback may lie outside of the limits
-        let start = Box32::point(nearest_f32(limits.initial_duty)).hull(nearest_f32(fallback.duty));
-        let limit = inward(limits.duty);
+        let remembered = |duties: &[f64], limits: &Limits, fallback: f64| {
+            // `init` writes the initial duty; the fallback may lie outside of the limits
+            let start = Box32::point(nearest_f32(limits.initial_duty)).hull(nearest_f32(fallback));
+            let limit = inward(limits.duty);
+            let duty = duties.iter().fold(start, |hull, duty| hull.hull(nearest_f32(*duty)));
+            [duty, start.hull(limit.low).hull(limit.high)]
+        };
+        let [previous_duty, previous_command] = remembered(duties, limits, fallback.duty);
         Inputs {
             signals: signals.iter().map(|signal| inward(signal.range)).collect(),
-            previous_duty: duties.iter().fold(start, |hull, duty| hull.hull(nearest_f32(*duty))),
-            previous_command: start.hull(limit.low).hull(limit.high),
+            previous_duty,
+            previous_command,
+            outputs: outputs
+                .iter()
+                .map(|output| remembered(&output.head.duties(), &output.limits, output.fallback))
+                .collect(),
             // the last thing that a step does with an estimate is the clamp
             estimates: observers
                 .iter()
@@ -173,6 +185,11 @@ impl Inputs {
 
     pub fn signal(&self, index: usize) -> Option<Box32> {
         self.signals.get(index).copied()
+    }
+
+    fn output(&self, index: usize, which: usize) -> Bounded {
+        let ranges = self.outputs.get(index).map(|ranges| ranges[which]);
+        ranges.ok_or(Overflow(f64::INFINITY))
     }
 
     fn estimate(&self, index: usize, estimate: Estimate) -> Option<Box32> {
@@ -189,6 +206,8 @@ pub(crate) fn expression(expr: &Expr, inputs: &Inputs) -> Bounded {
         Expr::Input(Input::Signal(index)) => inputs.signal(*index).ok_or(Overflow(f64::INFINITY)),
         Expr::Input(Input::PreviousDuty) => Ok(inputs.previous_duty),
         Expr::Input(Input::PreviousCommand) => Ok(inputs.previous_command),
+        Expr::Input(Input::OutputDuty(index)) => inputs.output(*index, 0),
+        Expr::Input(Input::OutputCommand(index)) => inputs.output(*index, 1),
         Expr::Input(Input::Estimate(index, estimate)) => {
             inputs.estimate(*index, *estimate).ok_or(Overflow(f64::INFINITY))
         }

@@ -82,6 +82,56 @@ pub(crate) fn one_gain(gain: f64) -> Message {
         .expected("limits that scale and offset reach into")
 }
 
+pub(crate) fn one_output(names: &[&str]) -> Message {
+    Message::new("this contract has several outputs, and one duty is taken here")
+        .found(format!("outputs {}", names.join(", ")))
+        .expected("a contract with one output")
+        .hint(
+            "`compile`, `inspect`, `verify` and the macro take several; `policyc new MODEL --output N` writes a contract for one of them",
+        )
+}
+
+pub(crate) fn beside_outputs(key: &str) -> Message {
+    Message::new(format!("[{key}] stands beside [[output]]"))
+        .expected(format!("`{key}` in each [[output]]"))
+        .hint("with several outputs each has its own actions, limits and mapping")
+}
+
+pub(crate) fn law_of_several() -> Message {
+    Message::new("a law of control has one output")
+        .found("`base`, `offsets` or `gains` in an [[output]]")
+        .expected("`duties`, `pairs` or `continuous`")
+        .hint("write a contract for each output: `policyc new MODEL --output N`")
+}
+
+pub(crate) fn observer_of_several() -> Message {
+    Message::new("an observer is driven by one duty")
+        .found("several outputs")
+        .hint("write a contract for each output: `policyc new MODEL --output N`")
+}
+
+pub(crate) fn golden_of_several() -> Message {
+    Message::new("golden answers are compared for one output")
+        .found("`golden` beside [[output]]")
+        .hint("compare them in a contract for each output: `policyc new MODEL --output N`")
+}
+
+pub(crate) fn columns_overlap(own: &std::ops::Range<usize>, other: &std::ops::Range<usize>) -> Message {
+    Message::new("a column of the last layer decides two outputs")
+        .found(format!("columns {} and {}", between(own), between(other)))
+        .expected("columns of its own for each output")
+}
+
+pub(crate) fn columns_outside(own: &std::ops::Range<usize>, columns: usize) -> Message {
+    Message::new("an output lies outside of the last layer")
+        .found(format!("columns {} of {columns}", between(own)))
+        .expected("every column in one output: as many as the outputs need together, from 0 on")
+}
+
+fn between(columns: &std::ops::Range<usize>) -> String {
+    format!("{} to {}", columns.start, columns.end.saturating_sub(1))
+}
+
 /// A quotient by 100 without the binary noise (0.44 rather than 0.44000000000000006).
 pub(crate) fn tidy(x: f64) -> f64 {
     // nobody types a duty or a period with more decimals; the binary noise lies behind the sixteenth digit

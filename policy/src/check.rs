@@ -10,15 +10,19 @@
 //! A section that is faulty gives `None` or less, and leaves a fault; what needs it is then left out instead of being
 //! reported as well. So nothing ends early, and a user sees every fault that stands on its own.
 
-use toml_input::{Sink, Table};
+use toml_input::{Document, Sink, Table};
 
 use crate::bounds::{self, Inputs, Overflow};
 use crate::catalogue;
-use crate::contract::{actions, features, head, mapping, network, observers, protection, residual, schedule, signals};
+use crate::contract::{
+    actions, features, head, mapping, network, observers, outputs, protection, residual, schedule, signals,
+};
 use crate::digests;
 use crate::faults::Faults;
 use crate::limits::MAX_FEATURES;
-use crate::model::{Digests, Fallback, Feature, Golden, Head, Interval, Layer, Limits, Mapping, Policy, Signal};
+use crate::model::{
+    Digests, Fallback, Feature, Golden, Head, Interval, Layer, Limits, Mapping, Output, Policy, Signal,
+};
 use crate::notes::{left_out, on_converters, on_duties, unused};
 use crate::raw::RawPolicy;
 use crate::weights::{self, Weights};
@@ -45,12 +49,40 @@ struct Sections<'a> {
     observers: observers::Observers<'a>,
     features: features::Features<'a>,
     network: Option<network::Network<'a>>,
+    decided: Decided,
+}
+
+/// From the network's outputs to the hardware.
+struct Decided {
     /// What the outputs mean, and how many the contract lists.
-    decided: Head,
+    head: Head,
     outputs: usize,
     mapping: Option<Option<Mapping>>,
     fallback: Option<Fallback>,
     limits: Option<Limits>,
+    /// Whether its sections were asked for.
+    is_read: bool,
+}
+
+impl Default for Decided {
+    fn default() -> Self {
+        Self {
+            head: Head::Choice(Vec::new()),
+            outputs: 0,
+            mapping: None,
+            fallback: None,
+            limits: None,
+            is_read: false,
+        }
+    }
+}
+
+/// The outputs of a contract with several; none of one with one.
+fn several(head: &Head) -> &[Output] {
+    match head {
+        Head::Several(outputs) => outputs,
+        Head::Choice(_) | Head::Residual(_) | Head::Continuous(_) | Head::Schedule(_) => &[],
+    }
 }
 
 fn sections<'a>(raw: &'a RawPolicy, faults: &mut Sink) -> Sections<'a> {
@@ -63,40 +95,94 @@ fn sections<'a>(raw: &'a RawPolicy, faults: &mut Sink) -> Sections<'a> {
         signals: &signals.list,
     };
     let observers = observers::read(&mut root, &around, &mut taken, faults);
+    let several = outputs::names(&mut root, &mut taken, raw.several, faults);
+    let mut estimates = observers.estimates.clone();
+    if let Some(several) = &several {
+        estimates.extend(several.remembered.iter().cloned());
+        if let Some(value) = raw.contract.peek(&["observer"]) {
+            faults.push(value.fault(catalogue::observer_of_several()));
+        }
+    }
     let around = features::Surroundings {
         signals: &signals.names,
-        estimates: &observers.estimates,
+        estimates: &estimates,
         parameters: &head.parameters,
         period: head.sample_period,
+        has_outputs: several.is_some(),
     };
     let features = features::read(&mut root, &around, faults);
     let network = network::read(&mut root, faults);
-    let actions = actions::read(&mut root, &around, &features.names(), faults);
-    let mapping = mapped(raw, &mut root, &signals.names, faults);
-    let fallback = protection::fallback(&mut root, faults);
-    let limits = protection::limits(&mut root, fallback, faults);
+    let decided = match several {
+        Some(several) => decided_several(raw, &mut root, several, &around, faults),
+        // a faulty list of outputs has left its fault
+        None if outputs::are_given(&raw.contract) => Decided::default(),
+        None => decided_one(raw, &mut root, &around, &features.names(), faults),
+    };
     // all sections have been asked for by now: a key that is left is one that nobody knows
-    root.finish(faults);
+    if several_is_sound(raw, &decided) {
+        root.finish(faults);
+    }
     Sections {
         head,
         signals,
         observers,
         features,
         network,
-        decided: residual::limited(actions.head, limits.map(|limits| limits.duty)),
+        decided,
+    }
+}
+
+/// A faulty list of outputs leaves sections unread: they are no unknown keys.
+fn several_is_sound(raw: &RawPolicy, decided: &Decided) -> bool {
+    decided.is_read || !outputs::are_given(&raw.contract)
+}
+
+fn decided_one(
+    raw: &RawPolicy,
+    root: &mut Table<'_>,
+    around: &features::Surroundings<'_>,
+    features: &[String],
+    faults: &mut Sink,
+) -> Decided {
+    let actions = actions::read(root, around, features, faults);
+    let mapping = outputs::mapped(root, raw.mapping.as_ref(), around.signals, faults);
+    let fallback = protection::fallback(root, faults);
+    let limits = protection::limits(root, fallback, faults);
+    Decided {
+        head: residual::limited(actions.head, limits.map(|limits| limits.duty)),
         outputs: actions.outputs,
         mapping,
         fallback,
         limits,
+        is_read: true,
+    }
+}
+
+fn decided_several(
+    raw: &RawPolicy,
+    root: &mut Table<'_>,
+    several: outputs::Outputs<'_>,
+    around: &features::Surroundings<'_>,
+    faults: &mut Sink,
+) -> Decided {
+    let (read, fallback) = outputs::read(root, several, around, &raw.mappings, faults);
+    let outputs = read.outputs.unwrap_or_default();
+    Decided {
+        limits: outputs.first().map(|first| first.limits),
+        head: Head::Several(outputs),
+        outputs: read.columns,
+        mapping: Some(None),
+        fallback,
+        is_read: true,
     }
 }
 
 fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     let read = sections(raw, faults);
     let (head, signals, observers, features) = (read.head, read.signals, read.observers, read.features);
-    let (network, mapping) = (read.network, read.mapping);
-    let (mut decided, output_count) = (read.decided, read.outputs);
-    let (fallback, limits) = (read.fallback, read.limits);
+    let (network, mapping) = (read.network, read.decided.mapping);
+    let (mut decided, output_count) = (read.decided.head, read.decided.outputs);
+    let (fallback, limits) = (read.decided.fallback, read.decided.limits);
     let feature_count = features.count;
     let duties = decided.duties();
     // a count of 0 is a faulty list: the widths of the weights cannot be judged by it
@@ -108,9 +194,14 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     let signals: Option<Vec<Signal>> = signals.list.into_iter().collect();
     let whole = observers.whole();
     let inputs = match (&signals, &whole, &limits, &fallback) {
-        (Some(signals), Some(whole), Some(limits), Some(fallback)) => {
-            Some(Inputs::new(signals, whole, &duties, limits, fallback))
-        }
+        (Some(signals), Some(whole), Some(limits), Some(fallback)) => Some(Inputs::new(
+            signals,
+            whole,
+            &duties,
+            several(&decided),
+            limits,
+            fallback,
+        )),
         _ => None,
     };
     let bounded = match (&inputs, head.sample_period) {
@@ -131,8 +222,8 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         bound_layers(raw, known, &mut weights.layers, faults);
         bound_outputs(raw, &decided, &weights.layers, faults);
     }
-    if let (Some(Some(mapping)), Some(inputs)) = (&mapping, &inputs) {
-        bound_mapping(raw, mapping, inputs, &duties, faults);
+    if let Some(inputs) = &inputs {
+        bound_mappings(raw, mapping.as_ref(), &decided, (inputs, &duties), faults);
     }
     // with sizes that the network does not have, every vector would be a fault of its own
     let Weights { layers, mut notes } = weights?;
@@ -150,7 +241,10 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     ));
     // from here on whatever is missing has left its fault
     let limits = limits?;
-    notes.extend(on_duties(&limits, &duties, mapped, known));
+    match several(&decided) {
+        [] => notes.extend(on_duties(&limits, &duties, mapped, known)),
+        outputs => notes.extend(outputs.iter().flat_map(|output| of_output(output, known))),
+    }
     let mut policy = Policy {
         name: head.name?,
         sample_period: head.sample_period?,
@@ -178,24 +272,6 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     Some(policy)
 }
 
-/// `None` if faulty, `Some(None)` without a mapping.
-fn mapped(raw: &RawPolicy, root: &mut Table<'_>, signals: &[String], faults: &mut Sink) -> Option<Option<Mapping>> {
-    let Some(value) = root.optional("mapping") else {
-        return Some(None);
-    };
-    let mut section = value.table("[mapping]", faults)?;
-    let hint = "the file with the coefficients: `file = \"drm.toml\"`";
-    if let Some(file) = section.required("file", hint, faults) {
-        file.text(faults);
-    }
-    let load_current = mapping::load_current(&mut section, signals, faults);
-    section.finish(faults);
-    let document = raw.mapping.as_ref()?;
-    // read without a load current too, so that the faults of drm.toml come in the same run
-    let mapping = mapping::read(document, load_current.unwrap_or_default(), faults)?;
-    load_current.map(|_| Some(mapping))
-}
-
 /// `None` if faulty, `Some(None)` without golden vectors.
 fn golden(
     raw: &RawPolicy,
@@ -206,6 +282,10 @@ fn golden(
     faults: &mut Sink,
 ) -> Option<Option<Golden>> {
     let Some(file) = &raw.golden else { return Some(None) };
+    if let (Head::Several(_), Some(at)) = (head, raw.contract.peek(&["network", "golden"])) {
+        faults.push(at.fault(catalogue::golden_of_several()));
+        return None;
+    }
     let (count, outputs) = sizes?;
     let shape = weights::golden::Shape {
         features: count,
@@ -265,7 +345,39 @@ fn bound_law(raw: &RawPolicy, head: &Head, inputs: &Inputs, faults: &mut Sink) {
     }
 }
 
-fn bound_mapping(raw: &RawPolicy, mapping: &Mapping, inputs: &Inputs, duties: &[f64], faults: &mut Sink) {
+/// The notes on one of several outputs, each with its name.
+fn of_output(output: &Output, features: &[Feature]) -> Vec<String> {
+    let notes = on_duties(&output.limits, &output.head.duties(), output.mapping.as_ref(), features);
+    let named = notes
+        .into_iter()
+        .map(|note| format!("output `{}`: {note}", output.name));
+    named.collect()
+}
+
+fn bound_mappings(
+    raw: &RawPolicy,
+    mapping: Option<&Option<Mapping>>,
+    head: &Head,
+    (inputs, duties): (&Inputs, &[f64]),
+    faults: &mut Sink,
+) {
+    if let Some(Some(mapping)) = mapping {
+        bound_mapping(raw, (mapping, raw.mapping.as_ref()), inputs, duties, faults);
+    }
+    for (output, document) in several(head).iter().zip(&raw.mappings) {
+        if let Some(mapping) = &output.mapping {
+            bound_mapping(raw, (mapping, document.as_ref()), inputs, &output.head.duties(), faults);
+        }
+    }
+}
+
+fn bound_mapping(
+    raw: &RawPolicy,
+    (mapping, document): (&Mapping, Option<&Document>),
+    inputs: &Inputs,
+    duties: &[f64],
+    faults: &mut Sink,
+) {
     let Some(current) = inputs.signal(mapping.load_current) else {
         return;
     };
@@ -275,10 +387,7 @@ fn bound_mapping(raw: &RawPolicy, mapping: &Mapping, inputs: &Inputs, duties: &[
         high: duties.iter().fold(0.0, |high, duty| duty.max(high)),
     };
     if let Err(magnitude) = mapping::magnitude_fits(mapping, current, duties) {
-        let file = raw
-            .mapping
-            .as_ref()
-            .map_or(&raw.contract.source().name, |document| &document.source().name);
+        let file = document.map_or(&raw.contract.source().name, |document| &document.source().name);
         faults.push(file.fault(catalogue::may_overflow("the mapped duty", magnitude)));
     }
 }

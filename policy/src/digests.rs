@@ -11,8 +11,8 @@ use sha2::{Digest, Sha256};
 
 use crate::activation::Activation;
 use crate::model::{
-    Action, Continuous, Digests, Expr, Fallback, Feature, Filter, Interval, Layer, Limits, Mapping, NumericFormat,
-    Observer, Policy, Residual, Schedule, Signal,
+    Action, Continuous, Digests, Expr, Fallback, Feature, Filter, Head, Interval, Layer, Limits, Mapping,
+    NumericFormat, Observer, Output, Policy, Residual, Schedule, Signal,
 };
 
 #[derive(Serialize)]
@@ -36,6 +36,8 @@ struct Contract<'a> {
     residual: Option<&'a Residual>,
     #[serde(skip_serializing_if = "Option::is_none")]
     schedule: Option<&'a Schedule>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    outputs: Option<&'a [Output]>,
     limits: &'a Limits,
     fallback: &'a Fallback,
 }
@@ -103,14 +105,26 @@ pub(crate) fn of(policy: &Policy) -> Digests {
         continuous: policy.head.continuous(),
         residual: policy.head.residual(),
         schedule: policy.head.schedule(),
+        outputs: match &policy.head {
+            Head::Several(outputs) => Some(outputs),
+            Head::Choice(_) | Head::Residual(_) | Head::Continuous(_) | Head::Schedule(_) => None,
+        },
         limits: &policy.limits,
         fallback: &policy.fallback,
     };
     Digests {
         weights: weights(&policy.layers),
         contract: json(&contract),
-        mapping: policy.mapping.as_ref().map(|mapping: &Mapping| json(mapping)),
+        mapping: mapping(policy),
     }
+}
+
+fn mapping(policy: &Policy) -> Option<String> {
+    let Head::Several(outputs) = &policy.head else {
+        return policy.mapping.as_ref().map(|mapping: &Mapping| json(mapping));
+    };
+    let all: Vec<Option<&Mapping>> = outputs.iter().map(|output| output.mapping.as_ref()).collect();
+    all.iter().any(Option::is_some).then(|| json(&all))
 }
 
 fn weights(layers: &[Layer]) -> String {

@@ -25,6 +25,8 @@ pub(crate) struct Scope<'a> {
     /// What observers estimate.
     pub estimates: &'a [(String, Input)],
     pub parameters: &'a BTreeMap<String, f64>,
+    /// Whether there are several outputs, whose duties have names of their own among the estimates.
+    pub has_outputs: bool,
 }
 
 /// A fault at a byte range of the expression.
@@ -317,8 +319,21 @@ impl Parser<'_> {
         }
     }
 
+    /// A duty of the step before where there are several.
+    fn whose(&self, name: &str) -> Message {
+        let ending = format!("_{name}");
+        let own = self.scope.estimates.iter().map(|(own, _)| own.as_str());
+        let own: Vec<&str> = own.filter(|own| own.ends_with(&ending)).collect();
+        catalogue::expression(&format!("`{name}` does not say of which output"))
+            .found(format!("{} outputs", own.len()))
+            .hint(format!("write {}", own.join(" or ")))
+    }
+
     fn lookup(&self, name: &str, span: &Span) -> Result<Value, Wrong> {
         let input = |input| Ok(Value::Open(Expr::Input(input)));
+        if self.scope.has_outputs && REMEMBERED.contains(&name) {
+            return Err((span.clone(), self.whose(name)));
+        }
         match name {
             "previous_duty" => return input(Input::PreviousDuty),
             "previous_command" => return input(Input::PreviousCommand),

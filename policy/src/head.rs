@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::activation::{Activation, Shape};
 use crate::interval::Interval;
 use crate::model::Expr;
+use crate::output::Output;
 use crate::rounding::{inward_f32, nearest_f32};
 
 /// From the last layer to a duty before the mapping.
@@ -19,6 +20,8 @@ pub enum Head {
     Continuous(Continuous),
     /// The outputs are the gains of a law of control.
     Schedule(Schedule),
+    /// Several duties, each decided by its own columns (section 9b); at least 2.
+    Several(Vec<Output>),
 }
 
 /// `duty = clamp(clamp(base) + offset)`: a law that is known, and what a network has learnt to add to it (section 8).
@@ -149,6 +152,7 @@ impl Head {
             Head::Residual(head) => head.offsets.len(),
             Head::Continuous(_) => 1,
             Head::Schedule(head) => head.gains.len(),
+            Head::Several(outputs) => outputs.iter().map(|output| output.head.outputs()).sum(),
         }
     }
 
@@ -158,7 +162,7 @@ impl Head {
         match self {
             Head::Choice(actions) => actions,
             Head::Residual(head) => &head.offsets,
-            Head::Continuous(_) | Head::Schedule(_) => &[],
+            Head::Continuous(_) | Head::Schedule(_) | Head::Several(_) => &[],
         }
     }
 
@@ -167,7 +171,7 @@ impl Head {
     pub fn continuous(&self) -> Option<&Continuous> {
         match self {
             Head::Continuous(head) => Some(head),
-            Head::Choice(_) | Head::Residual(_) | Head::Schedule(_) => None,
+            Head::Choice(_) | Head::Residual(_) | Head::Schedule(_) | Head::Several(_) => None,
         }
     }
 
@@ -176,7 +180,7 @@ impl Head {
     pub fn residual(&self) -> Option<&Residual> {
         match self {
             Head::Residual(head) => Some(head),
-            Head::Choice(_) | Head::Continuous(_) | Head::Schedule(_) => None,
+            Head::Choice(_) | Head::Continuous(_) | Head::Schedule(_) | Head::Several(_) => None,
         }
     }
 
@@ -185,7 +189,7 @@ impl Head {
     pub fn schedule(&self) -> Option<&Schedule> {
         match self {
             Head::Schedule(head) => Some(head),
-            Head::Choice(_) | Head::Residual(_) | Head::Continuous(_) => None,
+            Head::Choice(_) | Head::Residual(_) | Head::Continuous(_) | Head::Several(_) => None,
         }
     }
 
@@ -193,7 +197,7 @@ impl Head {
     #[must_use]
     pub fn duty_span(&self) -> Option<f64> {
         match self {
-            Head::Choice(_) | Head::Residual(_) => None,
+            Head::Choice(_) | Head::Residual(_) | Head::Several(_) => None,
             Head::Continuous(head) => Some(head.span()),
             Head::Schedule(head) => Some(head.limits.high - head.limits.low),
         }
@@ -208,7 +212,7 @@ impl Head {
     /// What it reads beside the network: a law of control, where that is left alone, and what gains are multiplied with.
     pub fn sources(&self) -> impl Iterator<Item = &Source> {
         let (base, zone, gains): (_, &[Still], &[Gain]) = match self {
-            Head::Choice(_) | Head::Continuous(_) => (None, &[], &[]),
+            Head::Choice(_) | Head::Continuous(_) | Head::Several(_) => (None, &[], &[]),
             Head::Residual(head) => (Some(&head.base), &head.dead_zone, &[]),
             Head::Schedule(head) => (Some(&head.base), &head.dead_zone, &head.gains),
         };
@@ -231,6 +235,7 @@ impl Head {
                 ends.map_or(Vec::new(), |(low, high)| vec![f64::from(low), f64::from(high)])
             }
             Head::Continuous(head) => head.ends_32().to_vec(),
+            Head::Several(outputs) => outputs.iter().flat_map(|output| output.head.duties()).collect(),
         }
     }
 }

@@ -29,6 +29,7 @@ pub mod model;
 mod names;
 mod notes;
 mod observer;
+mod output;
 mod raw;
 mod resized;
 pub mod rounding;
@@ -43,7 +44,7 @@ pub use faults::{Faults, Skeleton};
 pub use memory::memory_bounds;
 pub use model::*;
 pub use raw::{RawPolicy, ReadOptions, read};
-pub use scaffold::{Draft, DraftFeature, draft, new_contract, seen_from};
+pub use scaffold::{Draft, DraftFeature, DraftOutput, draft, new_contract, seen_from};
 pub use toml_input::{Fault, Place};
 pub use weights::{NamedTensor, chains, golden_fits, named_tensors};
 

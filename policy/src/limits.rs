@@ -17,6 +17,8 @@ pub const MAX_SIGNALS: usize = 32;
 pub const MAX_DEAD_ZONE: usize = 4;
 /// Most gains of a law that the network schedules.
 pub const MAX_GAINS: usize = 16;
+/// Most outputs of a contract: each takes its limits and its state into every step.
+pub const MAX_OUTPUTS: usize = 16;
 /// Most observers.
 pub const MAX_OBSERVERS: usize = 4;
 /// Most named parameters.

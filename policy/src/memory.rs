@@ -46,7 +46,9 @@ fn source(expr: &Expr, policy: &Policy) -> f64 {
             signal.map_or(0.0, |signal| signal.range.low.abs().max(signal.range.high.abs()))
         }
         // duties are within 0..1, those of a continuous head in either arithmetic: `contract::continuous` has seen to it
-        Expr::Input(Input::PreviousDuty | Input::PreviousCommand) => 1.0,
+        Expr::Input(Input::PreviousDuty | Input::PreviousCommand | Input::OutputDuty(_) | Input::OutputCommand(_)) => {
+            1.0
+        }
         Expr::Input(Input::Estimate(index, estimate)) => {
             let range = policy.observers.get(*index).map(|observer| observer.range(*estimate));
             range.map_or(0.0, |range| range.low.abs().max(range.high.abs()) * GROWTH)

@@ -15,6 +15,7 @@ pub use crate::interval::Interval;
 use crate::known_answers;
 pub use crate::known_answers::Golden;
 pub use crate::observer::{Circuit, Estimate, Gains, Hold, InputVoltage, Observer, OnTime};
+pub use crate::output::{DutyPath, Output};
 
 /// Number format in which the whole controller computes (`docs/reference/numeric-contract.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -130,11 +131,11 @@ pub struct Policy {
     pub layers: Vec<Layer>,
     /// What the outputs of the last layer mean.
     pub head: Head,
-    /// Duty ratio mapping, if any.
+    /// Duty ratio mapping, if any; `None` of several outputs, which have their own ([`Policy::paths`]).
     pub mapping: Option<Mapping>,
-    /// Limits of the commanded duty.
+    /// Limits of the commanded duty; of several outputs those of the first ([`Policy::paths`] has all).
     pub limits: Limits,
-    /// What happens without a usable measurement.
+    /// What happens without a usable measurement; of several outputs the duty is that of the first.
     pub fallback: Fallback,
     /// Known answers from the trainer.
     pub golden: Option<Golden>,
@@ -159,7 +160,7 @@ impl Policy {
         let observed = |observer: &Observer| match input {
             Input::PreviousCommand => true,
             Input::Signal(index) => observer.signals().any(|own| own == index),
-            Input::PreviousDuty | Input::Estimate(..) => false,
+            Input::PreviousDuty | Input::Estimate(..) | Input::OutputDuty(_) | Input::OutputCommand(_) => false,
         };
         let features = self.features.iter().map(|feature| &feature.source);
         let mut sources = features.chain(self.head.sources().map(|source| &source.tree));
@@ -201,7 +202,7 @@ impl Policy {
         match &mut self.head {
             Head::Choice(actions) => actions,
             Head::Residual(head) => &mut head.offsets,
-            Head::Continuous(_) | Head::Schedule(_) => &mut [],
+            Head::Continuous(_) | Head::Schedule(_) | Head::Several(_) => &mut [],
         }
     }
 }
@@ -264,6 +265,10 @@ pub enum Input {
     PreviousCommand,
     /// Estimate of an observer by index into [`Policy::observers`].
     Estimate(usize, Estimate),
+    /// Duty of the last step before its mapping, of several outputs the one of that index.
+    OutputDuty(usize),
+    /// Duty that last left the controller, of several outputs the one of that index.
+    OutputCommand(usize),
 }
 
 impl Input {
@@ -278,6 +283,9 @@ impl Input {
                 let observer = observers.get(index).map_or("?", |observer| &observer.name);
                 format!("{observer}_{}", estimate.word())
             }
+            // who prints them knows the outputs, too: these are for a message without them
+            Input::OutputDuty(index) => format!("previous_duty of output {index}"),
+            Input::OutputCommand(index) => format!("previous_command of output {index}"),
         }
     }
 }

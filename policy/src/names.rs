@@ -66,6 +66,9 @@ pub(crate) enum Kind {
     Feature,
     Observer,
     Estimate,
+    Output,
+    /// What an expression calls a duty of the step before.
+    Remembered,
 }
 
 impl Kind {
@@ -77,6 +80,8 @@ impl Kind {
             Kind::Feature => "feature",
             Kind::Observer => "observer",
             Kind::Estimate => "estimate",
+            Kind::Output => "output",
+            Kind::Remembered => "duty of an output",
         }
     }
 }

@@ -7,7 +7,7 @@ use toml_input::{Document, Fault, FileName, Files, Message, Origin, Sink, Source
 
 use crate::catalogue;
 use crate::faults::{Faults, Skeleton};
-use crate::limits::{MAX_TOML_BYTES, MAX_WEIGHT_BYTES};
+use crate::limits::{MAX_OUTPUTS, MAX_TOML_BYTES, MAX_WEIGHT_BYTES};
 use crate::names::{self, Kind};
 use crate::weights::header::not_a_contract;
 
@@ -24,6 +24,9 @@ pub struct ReadOptions {
     pub own_folder: bool,
     /// Do not read the golden vectors: whoever looks for what is wrong with the features must get past them.
     pub without_golden: bool,
+    /// Take a contract with several outputs ([`crate::Head::Several`]). Whoever knows one duty must not get one of several for it,
+    /// so they are refused unless somebody says that he knows them.
+    pub several_outputs: bool,
 }
 
 impl ReadOptions {
@@ -62,6 +65,10 @@ pub(crate) struct Binary {
 pub struct RawPolicy {
     pub(crate) contract: Document,
     pub(crate) mapping: Option<Document>,
+    /// Of each of several outputs.
+    pub(crate) mappings: Vec<Option<Document>>,
+    /// [`ReadOptions::several_outputs`]
+    pub(crate) several: bool,
     pub(crate) weights: Option<Binary>,
     pub(crate) golden: Option<Binary>,
     pub(crate) files: Vec<PathBuf>,
@@ -108,8 +115,8 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
         // in a text with faults of syntax the names of the other files may be what is broken
         .propagate()
         .map_err(|faults| rejected(&contract, files.clone(), faults))?;
-    let mut companion = |keys: &[&str], limit: u64| -> Option<Binary> {
-        let value = contract.peek(keys)?;
+    let mut companion = |value: Option<Value<'_>>, limit: u64| -> Option<Binary> {
+        let value = value?;
         let text = value.as_text()?;
         let read = beside(&name, text, options).and_then(|name| {
             // before it is read: a file that is missing has to cause a rebuild when it comes
@@ -118,16 +125,28 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
         });
         read.map_err(|message| faults.push(value.fault(message))).ok()
     };
-    let weights = companion(&["network", "weights"], MAX_WEIGHT_BYTES);
+    let weights = companion(contract.peek(&["network", "weights"]), MAX_WEIGHT_BYTES);
     let golden = match options.without_golden {
         true => None,
-        false => companion(&["network", "golden"], MAX_WEIGHT_BYTES),
+        false => companion(contract.peek(&["network", "golden"]), MAX_WEIGHT_BYTES),
     };
-    let mapping = companion(&["mapping", "file"], MAX_TOML_BYTES);
+    let mapping = companion(contract.peek(&["mapping", "file"]), MAX_TOML_BYTES);
+    let outputs = contract.peek(&["output"]).and_then(|value| value.as_list());
+    // more than there may be are refused unread
+    let outputs = outputs.unwrap_or_default().into_iter().take(MAX_OUTPUTS);
+    let of_outputs: Vec<Option<Binary>> = outputs
+        .map(|output| companion(output.peek("mapping").and_then(|own| own.peek("file")), MAX_TOML_BYTES))
+        .collect();
     let mapping = mapping.and_then(|file| document(file, &mut faults));
+    let mappings = of_outputs
+        .into_iter()
+        .map(|file| file.and_then(|file| document(file, &mut faults)))
+        .collect();
     Ok(RawPolicy {
         contract,
         mapping,
+        mappings,
+        several: options.several_outputs,
         weights,
         golden,
         files,

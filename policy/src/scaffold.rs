@@ -131,12 +131,23 @@ pub struct Draft {
     pub continuous: Option<String>,
     /// The entries of `gains` in `[actions]`, where the outputs are the gains of a law.
     pub gains: Vec<String>,
+    /// What each of several outputs is; none where there is one.
+    pub several: Vec<DraftOutput>,
     /// Least and largest duty that the network can command, where that is known.
     pub duties: Option<(f64, f64)>,
     /// Lines about the whole, without `#`.
     pub about: Vec<String>,
     /// What is known of each input; may be shorter than `inputs`.
     pub features: Vec<DraftFeature>,
+}
+
+/// What is known of one of several outputs.
+#[derive(Debug, Clone, Default)]
+pub struct DraftOutput {
+    /// The line of its actions.
+    pub actions: String,
+    /// Least and largest duty, where that is known.
+    pub duties: Option<(f64, f64)>,
 }
 
 /// What is known of one network input.
@@ -163,8 +174,10 @@ pub fn draft(draft: &Draft) -> String {
     // TOML's own quotes and escapes: a path may hold both
     let file = toml::Value::String(weights.clone()).to_string();
     let is_law = !draft.gains.is_empty();
+    let has_several = !draft.several.is_empty();
     let answers = match outputs {
         _ if is_law => format!("{outputs} gains of a law"),
+        _ if has_several => format!("{outputs} outputs for {} duties", draft.several.len()),
         1 => "one output".to_owned(),
         _ => format!("{outputs} actions"),
     };
@@ -207,6 +220,9 @@ pub fn draft(draft: &Draft) -> String {
     if !draft.bias {
         text += "bias = false                 # the file holds none\n";
     }
+    if has_several {
+        return text + &several(&draft.several);
+    }
     let beside = if draft.golden { "" } else { "# " };
     let golden = toml::Value::String(format!("{folder}golden.safetensors"));
     let _ = writeln!(
@@ -227,6 +243,27 @@ pub fn draft(draft: &Draft) -> String {
         false => actions(draft.continuous.as_deref(), *outputs),
     };
     text + &protection(draft.duties)
+}
+
+/// The outputs, each with limits and fallback, and what all share.
+fn several(outputs: &[DraftOutput]) -> String {
+    let mut text = "\n# One [[output]] for each duty, in the order of the columns of the last layer. A source calls the duty of the step before\n\
+                    # u0_previous_duty, and what left the controller u0_previous_command.\n"
+        .to_owned();
+    for (index, output) in outputs.iter().enumerate() {
+        let (low, high) = output.duties.unwrap_or((0.0, 1.0));
+        let limits = format!("duty = [{low:?}, {high:?}]");
+        let _ = write!(
+            text,
+            "\n[[output]]\nname = \"u{index}\"                  # check: a-z, 0-9, _; a constant of the code is called so\n\
+             [output.actions]\n{}\n\
+             [output.limits]\n{limits:<28} # check: smallest and largest duty the hardware may see\n\
+             [output.fallback]\nduty = 0.0                   # check: commanded without a usable measurement\n\
+             # [output.mapping]\n# file = \"drm.toml\"\n# load_current = \"i_out\"\n",
+            output.actions
+        );
+    }
+    text + "\n[fallback]\nhold = 3                     # check: bad samples bridged with the last good one, for all outputs\n"
 }
 
 fn law(gains: &[String]) -> String {

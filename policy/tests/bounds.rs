@@ -17,6 +17,7 @@ fn evaluate(expr: &Expr, signals: &[f32], duties: [f32; 2]) -> f32 {
         Expr::Input(Input::PreviousDuty) => duties[0],
         Expr::Input(Input::PreviousCommand) => duties[1],
         Expr::Input(Input::Estimate(..)) => unreachable!("no policy of this test has an observer"),
+        Expr::Input(Input::OutputDuty(_) | Input::OutputCommand(_)) => unreachable!("they have one output"),
         Expr::Constant(value) => f(*value),
         Expr::Neg(e) => -of(e),
         Expr::Add(a, b) => of(a) + of(b),

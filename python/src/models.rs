@@ -54,7 +54,7 @@ pub fn contract_json(py: Python<'_>, path: PathBuf) -> PyResult<String> {
         "signals": policy.signals,
         "observers": policy.observers.iter().map(|observer| self::observer(policy, observer)).collect::<Vec<_>>(),
         "features": policy.features,
-        "duties": match &policy.head { Head::Choice(_) => policy.head.duties(), Head::Continuous(_) | Head::Residual(_) | Head::Schedule(_) => Vec::new() },
+        "duties": match &policy.head { Head::Choice(_) => policy.head.duties(), Head::Continuous(_) | Head::Residual(_) | Head::Schedule(_) | Head::Several(_) => Vec::new() },
         "law": policy.head.residual().map(law),
         "continuous": policy.head.continuous(),
         "schedule": policy.head.schedule(),

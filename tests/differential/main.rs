@@ -7,6 +7,7 @@ mod formats;
 mod integrity;
 mod macro_crate;
 mod mutations;
+mod several;
 mod simplified;
 mod subnormal;
 mod warnings;

@@ -44,7 +44,7 @@ macro_rules! first_difference {
                     steps += 1;
                     different = (!equal).then_some(steps);
                 }
-                Event::SetMapping { a, b, c, r } => {
+                Event::SetMapping { a, b, c, r, .. } => {
                     let ([a, b, c], r) = ([a, b, c].map(|x| x as f32), r.map(|r| r as f32));
                     assert_eq!(generated.set_mapping(a, b, c), expected.set_mapping(a, b, c, r));
                 }

@@ -10,6 +10,7 @@ mod fallback;
 mod formats;
 mod included;
 mod saved;
+mod several;
 
 use std::collections::BTreeMap;
 

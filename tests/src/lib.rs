@@ -3,6 +3,7 @@
 pub mod browser;
 pub mod fixture;
 pub mod random;
+pub mod several;
 pub mod shards;
 pub mod tools;
 

@@ -233,7 +233,7 @@ fn estimate(rng: &mut SplitMix, observers: &[bool], signals: usize) -> String {
     }
 }
 
-fn source(rng: &mut SplitMix, signals: usize) -> String {
+pub(crate) fn source(rng: &mut SplitMix, signals: usize) -> String {
     let s = |rng: &mut SplitMix| format!("s{}", rng.below(signals));
     match rng.below(7) {
         0 => s(rng),
@@ -246,7 +246,7 @@ fn source(rng: &mut SplitMix, signals: usize) -> String {
     }
 }
 
-fn feature(text: &mut String, rng: &mut SplitMix, index: usize, source: &str) {
+pub(crate) fn feature(text: &mut String, rng: &mut SplitMix, index: usize, source: &str) {
     let _ = writeln!(text, "[[feature]]\nname = \"x{index}\"\nsource = \"{source}\"");
     let filters: Vec<String> = (0..rng.below(3)).map(|_| filter(rng)).collect();
     if !filters.is_empty() {
@@ -296,7 +296,7 @@ fn filter(rng: &mut SplitMix) -> String {
 const HEAD: u64 = 0x0068_6561_6400_0000;
 
 /// A continuous head of any form whose duties stay within 0..1: with and without scale and offset, of both signs.
-fn continuous(rng: &mut SplitMix) -> String {
+pub(crate) fn continuous(rng: &mut SplitMix) -> String {
     let (scale, offset) = (rng.uniform(0.05, 0.45), rng.uniform(0.46, 0.54));
     match rng.below(8) {
         0 => format!("continuous = {{ squash = \"tanh\", scale = {scale:?}, offset = {offset:?} }}"),
@@ -377,7 +377,7 @@ fn gain(rng: &mut SplitMix, size: f64) -> String {
     text
 }
 
-fn action_table(text: &mut String, rng: &mut SplitMix, actions: usize) {
+pub(crate) fn action_table(text: &mut String, rng: &mut SplitMix, actions: usize) {
     // pairs give three duties each; what is left over becomes a shorter list of factors
     if rng.one_in(2) {
         let duties: Vec<String> = (0..actions).map(|_| format!("{:?}", rng.uniform(0.0, 1.0))).collect();
@@ -431,7 +431,7 @@ fn protection(text: &mut String, rng: &mut SplitMix, signals: usize) {
 }
 
 /// Weights and, used or not, a mapping.
-fn weights(
+pub(crate) fn weights(
     rng: &mut SplitMix,
     features: usize,
     hidden: &[usize],

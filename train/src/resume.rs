@@ -192,6 +192,8 @@ fn read_state(from: &mut Reader<'_>) -> Result<State<f32>, Error> {
         soft_cap,
         mapping,
         mapping_check: mapping.map(|own| own.check_word()),
+        // a training has one duty
+        others: Vec::new(),
         bad_count: u32::try_from(from.u64()?).map_err(|_| other())?,
         primed: u32::try_from(from.u64()?).map_err(|_| other())?,
     })

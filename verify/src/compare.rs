@@ -109,7 +109,7 @@ pub fn measurement(policy: &Policy, event: &Event) -> Vec<Measured> {
                 sample: sample_value(sample, scalar),
             })
             .collect(),
-        Event::SetMapping { a, b, c, r } => floats(vec!["a", "b", "c", "r"], &[*a, *b, *c, r.unwrap_or(0.0)]),
+        Event::SetMapping { a, b, c, r, .. } => floats(vec!["a", "b", "c", "r"], &[*a, *b, *c, r.unwrap_or(0.0)]),
         Event::Network(observation) => floats(
             policy.features.iter().map(|feature| feature.name.as_str()).collect(),
             observation,

@@ -1,6 +1,6 @@
 //! What the interpreter answers, chunk by chunk, in the words of the protocol.
 
-use interp::{Controller, InputError, Real, State, Trace};
+use interp::{Coefficients, Controller, InputError, Real, State, Trace};
 use ndarray::Array1;
 use policy::Policy;
 use serde::Serialize;
@@ -45,6 +45,8 @@ pub struct Oracle<T> {
     controller: Controller<T>,
     trace: Trace<T>,
     layout: Layout,
+    /// First column of each output.
+    columns: Vec<usize>,
     steps: u64,
     checksum: Crc32,
     coverage: Coverage,
@@ -57,6 +59,7 @@ impl<T: Real> Oracle<T> {
         Self {
             trace: fresh.blank_trace(),
             layout: Layout::new(policy, fresh.state_names()),
+            columns: policy.paths().iter().map(|path| path.column).collect(),
             controller: fresh.clone(),
             fresh,
             steps: 0,
@@ -139,10 +142,13 @@ impl<T: Real> Oracle<T> {
                 let trace = &self.trace;
                 let command = trace.command;
                 let values = trace.observation.iter().chain(&trace.q_values).copied();
-                for number in values.chain([command.duty, command.duty_sim]) {
+                let duties = trace.commands().map(|command| command.duty);
+                let duties = duties.chain(trace.commands().map(|command| command.duty_sim));
+                for number in values.chain(duties) {
                     number.append_words(words);
                 }
-                words.extend([command.action_index, command.status]);
+                words.extend(trace.commands().map(|command| command.action_index));
+                words.push(command.status);
                 self.controller.state().append_words(words);
                 // purity: the interpreter has one state and cannot contradict itself
                 words.push(0);
@@ -151,11 +157,14 @@ impl<T: Real> Oracle<T> {
                     *count += u64::from(command.status >> bit & 1);
                 }
                 // section 9: the index is below N, after a fallback too
-                self.coverage.actions[command.action_index as usize] += 1;
+                for (command, column) in trace.commands().zip(&self.columns) {
+                    self.coverage.actions[column + command.action_index as usize] += 1;
+                }
             }
-            Event::SetMapping { a, b, c, r } => {
+            Event::SetMapping { output, a, b, c, r } => {
                 let [a, b, c] = [*a, *b, *c].map(T::nearest);
-                let accepted = self.controller.set_mapping(a, b, c, r.map(T::nearest));
+                let r = r.map(T::nearest);
+                let accepted = self.controller.set_mapping_of(*output, Coefficients { a, b, c, r });
                 words.push(u32::from(accepted));
                 self.controller.state().append_words(words);
                 self.coverage.mappings_accepted += u64::from(accepted);

@@ -5,15 +5,15 @@
 //!
 //! | event | payload | answer |
 //! |---|---|---|
-//! | [`kind::STEP`] | per signal: a number or an i32 code | observation, Q values, duty, duty_sim, action_index, status, state, purity |
-//! | [`kind::SET_MAPPING`] | a, b, c, r (r = 0 in the three-term form) | accepted, state |
+//! | [`kind::STEP`] | per signal: a number or an i32 code | observation, Q values, duties, duties before the mapping, action indices, status, state, purity |
+//! | [`kind::SET_MAPPING`] | output, a, b, c, r (r = 0 in the three-term form) | accepted, state |
 //! | [`kind::RESET`], [`kind::INIT`] | | state |
 //! | [`kind::NETWORK`] | observation | Q values |
 //!
 //! A number is the bits of a binary32 number, or in `f64` two words, the low one first. Each answer is flushed, so that a crash or a hang shows at the event that caused it.
 
 use interp::{Real, Sample};
-use policy::{Policy, Scalar};
+use policy::{DutyPath, Policy, Scalar};
 
 use crate::traces::Event;
 
@@ -114,11 +114,17 @@ impl Layout {
                 _ => number(format!("state {name}")),
             })
             .collect();
-        let duties = ["duty", "duty_sim"]
+        let paths = policy.paths();
+        let named = |name: &str, path: &DutyPath<'_>| path.name.map_or(name.to_owned(), |own| format!("{name} {own}"));
+        let duties = ["duty", "duty_sim"];
+        let duties = duties
             .into_iter()
-            .flat_map(|name| number(name.to_owned()));
-        let integers = [("action_index", WordKind::Integer), ("status", WordKind::Status)];
-        let command = duties.chain(integers.map(|(name, kind)| word(name.to_owned(), kind)));
+            .flat_map(|name| paths.iter().map(move |path| named(name, path)));
+        let indices = paths
+            .iter()
+            .map(|path| word(named("action_index", path), WordKind::Integer));
+        let status = [word("status".to_owned(), WordKind::Status)];
+        let command = duties.flat_map(number).chain(indices).chain(status);
         let step = observation
             .chain(network.iter().cloned())
             .chain(command)
@@ -130,10 +136,7 @@ impl Layout {
             scalar,
             signals: policy.signals.len(),
             features: policy.features.len(),
-            four_terms: policy
-                .mapping
-                .as_ref()
-                .is_some_and(|mapping| mapping.coefficients.r.is_some()),
+            four_terms: (paths.iter().filter_map(|path| path.mapping)).any(|mapping| mapping.coefficients.r.is_some()),
             step,
             set_mapping: [accepted].into_iter().chain(state.iter().cloned()).collect(),
             state,
@@ -200,8 +203,8 @@ pub fn encode(event: &Event, scalar: Scalar, words: &mut Vec<u32>) {
                 encode_sample(*sample, scalar, words);
             }
         }
-        Event::SetMapping { a, b, c, r } => {
-            words.push(kind::SET_MAPPING);
+        Event::SetMapping { output, a, b, c, r } => {
+            words.extend([kind::SET_MAPPING, *output as u32]);
             // always four: so the length of an event follows from its kind alone
             for number in [*a, *b, *c, r.unwrap_or(0.0)] {
                 encode_number(number, scalar, words);

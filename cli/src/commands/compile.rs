@@ -67,7 +67,7 @@ impl Made {
 pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     // a name that is no target's is said before a policy is read
     codegen::target(&options.target)?;
-    let policy = super::load_as(&options.policy, options.outside, options.format)?;
+    let policy = super::load_several_as(&options.policy, options.outside, options.format)?;
     let working = Working::new(match options.no_costs {
         true => "generating",
         false => "generating, and building to measure a step",

@@ -13,7 +13,7 @@ use crate::talk;
 
 /// Prints the checked policy.
 pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
-    let policy = super::load_as(&options.policy, options.outside, options.format)?;
+    let policy = super::load_several_as(&options.policy, options.outside, options.format)?;
     if options.json {
         output::say(&json(&policy)?)?;
     } else {
@@ -30,7 +30,7 @@ pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
             let decided = match policy.head {
                 Head::Continuous(_) => "the trainer's duties more",
                 Head::Schedule(_) => "the trainer's gains more",
-                Head::Choice(_) | Head::Residual(_) => "more of the trainer's decisions",
+                Head::Choice(_) | Head::Residual(_) | Head::Several(_) => "more of the trainer's decisions",
             };
             talk::different(
                 &format!("the numeric format changes {decided} than the contract allows"),
@@ -66,14 +66,56 @@ struct View<'p> {
     residual: Option<&'p policy::Residual>,
     #[serde(skip_serializing_if = "Option::is_none")]
     schedule: Option<&'p policy::Schedule>,
+    /// Several, each with what stands below for one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    outputs: Vec<OutputView<'p>>,
     mapping: Option<policy::Mapping>,
-    limits: policy::Limits,
-    fallback: policy::Fallback,
+    /// Of one output.
+    limits: Option<policy::Limits>,
+    fallback: FallbackView,
     golden_vectors: usize,
     decisions: Option<verify::Decisions>,
     digests: &'p policy::Digests,
     sizes: manifest::Sizes,
     notes: &'p [String],
+}
+
+/// What happens without a usable measurement; each of several outputs has a duty of its own.
+#[derive(Serialize)]
+struct FallbackView {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    duty: Option<f64>,
+    hold: u32,
+}
+
+/// One of several outputs.
+#[derive(Serialize)]
+struct OutputView<'p> {
+    name: &'p str,
+    /// First column of the last layer.
+    column: usize,
+    actions: &'p [policy::Action],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    continuous: Option<&'p policy::Continuous>,
+    mapping: Option<&'p policy::Mapping>,
+    limits: &'p policy::Limits,
+    fallback_duty: f64,
+}
+
+fn outputs(policy: &Policy) -> Vec<OutputView<'_>> {
+    let Head::Several(outputs) = &policy.head else {
+        return Vec::new();
+    };
+    let all = outputs.iter().map(|output| OutputView {
+        name: &output.name,
+        column: output.column,
+        actions: output.head.actions(),
+        continuous: output.head.continuous(),
+        mapping: output.mapping.as_ref(),
+        limits: &output.limits,
+        fallback_duty: output.fallback,
+    });
+    all.collect()
 }
 
 #[derive(Serialize)]
@@ -87,6 +129,8 @@ struct LayerView<'p> {
 }
 
 fn view(policy: &Policy) -> View<'_> {
+    let outputs = outputs(policy);
+    let is_one = outputs.is_empty();
     View {
         name: &policy.name,
         sample_period: policy.sample_period,
@@ -109,9 +153,13 @@ fn view(policy: &Policy) -> View<'_> {
         continuous: policy.head.continuous(),
         residual: policy.head.residual(),
         schedule: policy.head.schedule(),
+        outputs,
         mapping: policy.mapping,
-        limits: policy.limits,
-        fallback: policy.fallback,
+        limits: is_one.then_some(policy.limits),
+        fallback: FallbackView {
+            duty: is_one.then_some(policy.fallback.duty),
+            hold: policy.fallback.hold,
+        },
         golden_vectors: policy.golden.as_ref().map_or(0, |golden| golden.count),
         decisions: verify::decisions(policy, None),
         digests: &policy.digests,

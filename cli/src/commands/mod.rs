@@ -47,6 +47,19 @@ fn load(path: &Path, outside: Outside) -> Result<Policy, Failure> {
     Ok(policy::load_with(&contract_path(path), &options(outside))?)
 }
 
+/// [`load`] of a contract with one output or several, in another numeric format if one is asked for.
+pub fn load_several_as(path: &Path, outside: Outside, format: Option<NumericFormat>) -> Result<Policy, Failure> {
+    let options = ReadOptions {
+        several_outputs: true,
+        ..options(outside)
+    };
+    let policy = policy::load_with(&contract_path(path), &options)?;
+    Ok(match format {
+        Some(format) => policy.with_format(format),
+        None => policy,
+    })
+}
+
 /// [`load`] without the golden vectors.
 fn load_without_golden(path: &Path, outside: Outside) -> Result<Policy, Failure> {
     let options = ReadOptions {

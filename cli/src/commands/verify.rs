@@ -52,7 +52,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
 /// # Errors
 /// Their faults.
 pub fn check(options: &Verify) -> Result<(), Failure> {
-    let policy = super::load_as(&options.policy, options.outside, options.format)?;
+    let policy = super::load_several_as(&options.policy, options.outside, options.format)?;
     traces(options, &policy).map(|_| ())
 }
 
@@ -68,7 +68,7 @@ fn compare(options: &Verify) -> Result<Outcome, Failure> {
         (None, Some(folder)) => folder::numeric_format(folder),
         (None, None) => None,
     };
-    let policy = super::load_as(&options.policy, options.outside, written)?;
+    let policy = super::load_several_as(&options.policy, options.outside, written)?;
     super::no_choices(&policy, options.golden_decisions)?;
     let recorded = traces(options, &policy)?;
     for (path, recording) in options.trace.iter().zip(&recorded) {

@@ -34,7 +34,7 @@ pub fn emit(program: &Program) -> Result<GeneratedFiles, CodegenError> {
 /// The view of a file of that title.
 pub fn view(program: &Program, title: &str) -> BlockView {
     let scalar = program.scalar();
-    let mapping = program.mapping.as_ref();
+    let mapping = program.mapping();
     let coefficients = || mapping.iter().flat_map(|mapping| &mapping.coefficients);
     let parameter = |(name, value, low, high): &(Coefficient, Literal, Literal, Literal)| ParameterView {
         name: name.name().to_owned(),
@@ -59,7 +59,7 @@ pub fn view(program: &Program, title: &str) -> BlockView {
             .map(|(name, ..)| name.name())
             .collect::<Vec<_>>()
             .join(", "),
-        fallback: number(scalar, program.fallback_duty),
+        fallback: number(scalar, program.fallback_duty()),
         sample_period: format!("{:?}", program.sample_period),
         // the state and one word
         // in doubles, which hold two words each

@@ -9,10 +9,10 @@
 //! In: the contract's mapping and limits. Out: a block for the command, one for what is remembered. The one invariant: everything
 //! is computed in every step, and the backend selects the fallback where the step is not usable.
 
-use policy::{Mapping, Policy, Scalar};
+use policy::{DutyPath, Limits, Mapping, Policy, Scalar};
 
 use super::head;
-use crate::program::{Advance, Block, Coefficient, Decide, Literal, Op, ValueId, Within};
+use crate::program::{Advance, Block, Coefficient, Decide, Duty, Literal, Op, ValueId, Within};
 
 /// One bit of the status word.
 #[derive(Debug, Clone, Copy)]
@@ -56,7 +56,7 @@ pub fn bit(name: &str) -> u32 {
     STATUS.iter().find(|bit| bit.name == name).map_or(0, |bit| bit.number)
 }
 
-/// Lowers the way from the chosen duty to the command.
+/// Lowers the way from the chosen duties to the command.
 pub fn decide(policy: &Policy) -> Decide {
     let scalar = policy.numeric_format.scalar();
     let mut block = Block::default();
@@ -67,26 +67,49 @@ pub fn decide(policy: &Policy) -> Decide {
     if policy.features.iter().any(|feature| feature.clip.is_some()) {
         status.push((bit("CLIPPED"), block.value(Op::Clipped)));
     }
+    let paths = policy.paths();
+    let duty = |(index, path): (usize, &DutyPath<'_>)| limited(scalar, path, index, &mut block, &mut status);
+    let duties = paths.iter().enumerate().map(duty).collect();
+    Decide {
+        block,
+        duties,
+        // behind the last clamp a duty is outside only if it is no number: to ask that alone costs one comparison less
+        within: Within::of(
+            scalar,
+            (Literal::exact(f64::NEG_INFINITY), Literal::exact(f64::INFINITY)),
+        ),
+        status,
+    }
+}
+
+/// The duty of the output of that index, from what the network says to the last limiter.
+fn limited(
+    scalar: Scalar,
+    path: &DutyPath<'_>,
+    index: usize,
+    block: &mut Block,
+    status: &mut Vec<(u32, ValueId)>,
+) -> Duty {
     // each limiter takes what the one before left, in the order of section 9: the duty limits have the last word
-    let duty_sim = head::duty(policy, &mut block);
+    let duty_sim = head::duty(scalar, path, index, block);
     let mut duty = duty_sim;
-    if let Some(map) = &policy.mapping {
+    if let Some(map) = path.mapping {
         let outside;
-        (duty, outside) = mapping(scalar, &mut block, map, duty_sim);
+        (duty, outside) = mapping(scalar, block, (index, map), duty_sim);
         status.push((bit("MAPPING_RANGE"), outside));
     }
-    if let Some(slew) = policy.limits.slew {
+    if let Some(slew) = path.limits.slew {
         let step = block.constant(Literal::down(scalar, slew));
         // around what left the controller, not around the chosen duty: the hardware moves from the former
-        let before = block.value(Op::PreviousCommand);
+        let before = block.value(Op::PreviousCommand(index));
         let low = block.value(Op::Sub(before, step));
         let high = block.value(Op::Add(before, step));
         let limited = block.value(Op::Clamp { x: duty, low, high });
-        status.push((bit("SLEW_LIMITED"), changed(&mut block, duty, limited)));
+        status.push((bit("SLEW_LIMITED"), changed(block, duty, limited)));
         duty = limited;
     }
-    if policy.limits.soft_start.is_some() {
-        let cap = block.value(Op::SoftCap);
+    if path.limits.soft_start.is_some() {
+        let cap = block.value(Op::SoftCap(index));
         // from above alone: a soft start never raises a duty
         let above = block.value(Op::Above(duty, cap));
         status.push((bit("SOFT_START"), above));
@@ -96,21 +119,13 @@ pub fn decide(policy: &Policy) -> Decide {
             otherwise: duty,
         });
     }
-    let range = Literal::inward(scalar, policy.limits.duty);
+    let range = Literal::inward(scalar, path.limits.duty);
     let (low, high) = (block.constant(range.0), block.constant(range.1));
     let limited = block.value(Op::Clamp { x: duty, low, high });
-    status.push((bit("LIMITED"), changed(&mut block, duty, limited)));
-    duty = limited;
-    Decide {
-        block,
-        duty,
-        // behind the last clamp a duty is outside only if it is no number: to ask that alone costs one comparison less
-        within: Within::of(
-            scalar,
-            (Literal::exact(f64::NEG_INFINITY), Literal::exact(f64::INFINITY)),
-        ),
+    status.push((bit("LIMITED"), changed(block, duty, limited)));
+    Duty {
+        duty: limited,
         duty_sim,
-        status,
     }
 }
 
@@ -122,17 +137,17 @@ fn changed(block: &mut Block, value: ValueId, clamped: ValueId) -> ValueId {
 }
 
 /// Mapped duty and the flag that it was extrapolated.
-fn mapping(scalar: Scalar, block: &mut Block, map: &Mapping, duty: ValueId) -> (ValueId, ValueId) {
+fn mapping(scalar: Scalar, block: &mut Block, (output, map): (usize, &Mapping), duty: ValueId) -> (ValueId, ValueId) {
     let current = block.value(Op::Sanitised(map.load_current));
-    let a = block.value(Op::Coefficient(Coefficient::A));
-    let b = block.value(Op::Coefficient(Coefficient::B));
-    let c = block.value(Op::Coefficient(Coefficient::C));
+    let a = block.value(Op::Coefficient(output, Coefficient::A));
+    let b = block.value(Op::Coefficient(output, Coefficient::B));
+    let c = block.value(Op::Coefficient(output, Coefficient::C));
     let gain = block.value(Op::Mul(a, duty));
     let load = block.value(Op::Mul(b, current));
     let sum = block.value(Op::Add(gain, load));
     let mut mapped = block.value(Op::Add(sum, c));
     if map.coefficients.r.is_some() {
-        let r = block.value(Op::Coefficient(Coefficient::R));
+        let r = block.value(Op::Coefficient(output, Coefficient::R));
         let scaled = block.value(Op::Mul(r, current));
         let product = block.value(Op::Mul(scaled, duty));
         mapped = block.value(Op::Add(mapped, product));
@@ -148,31 +163,36 @@ fn mapping(scalar: Scalar, block: &mut Block, map: &Mapping, duty: ValueId) -> (
     (mapped, block.value(Op::Or(duty_outside, current_outside)))
 }
 
-/// Lowers the next soft-start limit.
+/// Lowers the next soft-start limits.
 pub fn advance(policy: &Policy) -> Advance {
     let scalar = policy.numeric_format.scalar();
     let mut block = Block::default();
-    let soft_cap = policy.limits.soft_start.map(|soft| {
-        let increment = (policy.limits.duty.high - soft.from) / f64::from(soft.steps);
-        let cap = block.value(Op::SoftCap);
-        let increment = block.constant(Literal::nearest(scalar, increment));
-        let risen = block.value(Op::Add(cap, increment));
-        let max = block.constant(Literal::down(scalar, policy.limits.duty.high));
-        // `c if c < max else max`: equal values have equal bits, duties are never -0 here
-        let above = block.value(Op::Above(risen, max));
-        let capped = block.value(Op::Select {
-            flag: above,
-            then: max,
-            otherwise: risen,
-        });
-        // a soft start begins again behind a fallback
-        let usable = block.value(Op::Usable);
-        let from = block.constant(Literal::nearest(scalar, soft.from));
-        block.value(Op::Select {
-            flag: usable,
-            then: capped,
-            otherwise: from,
-        })
+    let paths = policy.paths();
+    let cap = |(index, path): (usize, &DutyPath<'_>)| soft_cap(scalar, path.limits, index, &mut block);
+    let soft_caps = paths.iter().enumerate().map(cap).collect();
+    Advance { block, soft_caps }
+}
+
+fn soft_cap(scalar: Scalar, limits: &Limits, index: usize, block: &mut Block) -> Option<ValueId> {
+    let soft = limits.soft_start?;
+    let increment = (limits.duty.high - soft.from) / f64::from(soft.steps);
+    let cap = block.value(Op::SoftCap(index));
+    let increment = block.constant(Literal::nearest(scalar, increment));
+    let risen = block.value(Op::Add(cap, increment));
+    let max = block.constant(Literal::down(scalar, limits.duty.high));
+    // `c if c < max else max`: equal values have equal bits, duties are never -0 here
+    let above = block.value(Op::Above(risen, max));
+    let capped = block.value(Op::Select {
+        flag: above,
+        then: max,
+        otherwise: risen,
     });
-    Advance { block, soft_cap }
+    // a soft start begins again behind a fallback
+    let usable = block.value(Op::Usable);
+    let from = block.constant(Literal::nearest(scalar, soft.from));
+    Some(block.value(Op::Select {
+        flag: usable,
+        then: capped,
+        otherwise: from,
+    }))
 }

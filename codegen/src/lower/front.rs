@@ -147,7 +147,8 @@ impl Builder {
     /// their filters.
     fn law(&mut self, head: &Head, filtered: &[ValueId]) -> Law {
         match head {
-            Head::Choice(_) | Head::Continuous(_) => Law::default(),
+            // several outputs have no law
+            Head::Choice(_) | Head::Continuous(_) | Head::Several(_) => Law::default(),
             Head::Residual(head) => {
                 let x = self.expression(&head.base.tree);
                 let (low, high) = Literal::inward(self.scalar, head.limits);
@@ -189,8 +190,10 @@ impl Builder {
         let op = match expression {
             Expr::Input(Input::Signal(index)) => return self.signals[*index],
             Expr::Input(Input::Estimate(index, estimate)) => return self.estimates[*index][*estimate as usize],
-            Expr::Input(Input::PreviousDuty) => Op::PreviousDuty,
-            Expr::Input(Input::PreviousCommand) => Op::PreviousCommand,
+            Expr::Input(Input::PreviousDuty) => Op::PreviousDuty(0),
+            Expr::Input(Input::PreviousCommand) => Op::PreviousCommand(0),
+            Expr::Input(Input::OutputDuty(index)) => Op::PreviousDuty(*index),
+            Expr::Input(Input::OutputCommand(index)) => Op::PreviousCommand(*index),
             Expr::Constant(value) => Op::Constant(Literal::nearest(self.scalar, *value)),
             Expr::Neg(x) => Op::Neg(self.expression(x)),
             Expr::Add(x, y) => Op::Add(self.expression(x), self.expression(y)),

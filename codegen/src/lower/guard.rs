@@ -1,6 +1,6 @@
 //! Contract section 1: what a sound state lies within.
 
-use policy::{Input, Policy, Scalar};
+use policy::{DutyPath, Policy, Scalar};
 
 use super::head;
 use crate::program::{Guard, Guarded, Literal, Place, SignalPort, Within};
@@ -17,26 +17,40 @@ pub fn lower(policy: &Policy, signals: &[SignalPort]) -> Guard {
         .map(|(index, signal)| within(Place::Held(index), signal.range))
         .collect();
     numbers.extend(memories(policy, scalar));
-    // what nothing reads decides no duty, and each comparison is paid in every step
-    // reset and fallback write these two without a limiter, and they may lie outside of the duty limits
-    let start = [policy.limits.initial_duty, policy.fallback.duty].map(|duty| Literal::nearest(scalar, duty));
-    let (min, max) = Literal::inward(scalar, policy.limits.duty);
-    if policy.reads(Input::PreviousDuty) {
-        let duties = head::duties(policy);
-        numbers.push(within(Place::PreviousDuty, hull(start.into_iter().chain(duties))));
-    }
-    if policy.reads(Input::PreviousCommand) || policy.limits.slew.is_some() {
-        let range = hull(start.into_iter().chain([min, max]));
-        numbers.push(within(Place::PreviousCommand, range));
-    }
-    if let Some(soft) = policy.limits.soft_start {
-        let range = hull([Literal::nearest(scalar, soft.from), max].into_iter());
-        numbers.push(within(Place::SoftCap, range));
+    for (index, path) in policy.paths().iter().enumerate() {
+        remembered(policy, path, index, &mut numbers);
     }
     Guard {
         numbers,
         // the counter stops one above K
         bad_count: policy.fallback.hold.saturating_add(1),
+    }
+}
+
+/// What is remembered of the output of that index.
+fn remembered(policy: &Policy, path: &DutyPath<'_>, index: usize, numbers: &mut Vec<Guarded>) {
+    let scalar = policy.numeric_format.scalar();
+    let mut within = |place: Place, range: (Literal, Literal)| {
+        numbers.push(Guarded {
+            place,
+            within: Within::of(scalar, range),
+        });
+    };
+    // what nothing reads decides no duty, and each comparison is paid in every step
+    // reset and fallback write these two without a limiter, and they may lie outside of the duty limits
+    let start = [path.limits.initial_duty, path.fallback].map(|duty| Literal::nearest(scalar, duty));
+    let (min, max) = Literal::inward(scalar, path.limits.duty);
+    if policy.reads(path.previous_duty) {
+        let duties = head::duties(scalar, path.head);
+        within(Place::PreviousDuty(index), hull(start.into_iter().chain(duties)));
+    }
+    if policy.reads(path.previous_command) || path.limits.slew.is_some() {
+        let range = hull(start.into_iter().chain([min, max]));
+        within(Place::PreviousCommand(index), range);
+    }
+    if let Some(soft) = path.limits.soft_start {
+        let range = hull([Literal::nearest(scalar, soft.from), max].into_iter());
+        within(Place::SoftCap(index), range);
     }
 }
 

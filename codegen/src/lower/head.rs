@@ -1,8 +1,8 @@
 //! Contract sections 7b, 7c and 8: from the outputs of the network to a duty before the mapping.
 
-use policy::{Continuous, Factor, Gain, Interval, Policy, Residual, Scalar, Schedule, Squash};
+use policy::{Continuous, DutyPath, Factor, Gain, Interval, Output, Policy, Residual, Scalar, Schedule, Squash};
 
-use crate::program::{Block, Head, Literal, Op, ValueId};
+use crate::program::{Block, Head, HeadPart, Literal, Op, ValueId};
 
 /// What the outputs mean.
 pub fn lower(policy: &Policy) -> Head {
@@ -22,6 +22,28 @@ pub fn lower(policy: &Policy) -> Head {
         policy::Head::Schedule(head) => Head::Gains {
             curves: head.gains.iter().map(|gain| curve(gain.squash)).collect(),
         },
+        policy::Head::Several(outputs) => several(scalar, outputs),
+    }
+}
+
+fn several(scalar: Scalar, outputs: &[Output]) -> Head {
+    let columns = outputs.iter().map(|output| output.head.outputs()).sum();
+    let mut curves = vec![None; columns];
+    for output in outputs {
+        let own = output.head.continuous().and_then(|head| curve(Some(head.squash)));
+        if let Some(at) = curves.get_mut(output.column) {
+            *at = own;
+        }
+    }
+    let part = |output: &Output| HeadPart {
+        column: output.column,
+        duties: (output.head.actions().iter())
+            .map(|action| Literal::nearest(scalar, action.duty))
+            .collect(),
+    };
+    Head::Several {
+        parts: outputs.iter().map(part).collect(),
+        curves,
     }
 }
 
@@ -32,17 +54,27 @@ fn curve(squash: Option<Squash>) -> Option<policy::Activation> {
     }
 }
 
-/// The duty as operations.
-pub fn duty(policy: &Policy, block: &mut Block) -> ValueId {
-    let scalar = policy.numeric_format.scalar();
-    let head = match &policy.head {
-        policy::Head::Choice(_) => return block.value(Op::ChosenDuty),
+/// The duty of the output of that index as operations.
+pub fn duty(scalar: Scalar, path: &DutyPath<'_>, index: usize, block: &mut Block) -> ValueId {
+    let head = match path.head {
+        // an output has one of the others
+        policy::Head::Choice(_) | policy::Head::Several(_) => return block.value(Op::ChosenDuty(index)),
         policy::Head::Residual(head) => return residual(scalar, head, block),
         policy::Head::Schedule(head) => return schedule(scalar, head, block),
         policy::Head::Continuous(head) => head,
     };
-    let output = block.value(Op::Output);
-    mapped(scalar, Some(head.squash), (head.scale, head.offset), (output, 0), block)
+    let (op, column) = match path.name {
+        None => (Op::Output, 0),
+        Some(_) => (Op::Gain(path.column), path.column),
+    };
+    let output = block.value(op);
+    mapped(
+        scalar,
+        Some(head.squash),
+        (head.scale, head.offset),
+        (output, column),
+        block,
+    )
 }
 
 /// A value, the output of that index, behind squash, scale and offset.
@@ -114,7 +146,7 @@ fn schedule(scalar: Scalar, head: &Schedule, block: &mut Block) -> ValueId {
 
 /// The law's duty with the offset, but where nothing is to be added.
 fn residual(scalar: Scalar, head: &Residual, block: &mut Block) -> ValueId {
-    let mut offset = block.value(Op::ChosenDuty);
+    let mut offset = block.value(Op::ChosenDuty(0));
     if !head.dead_zone.is_empty() {
         let flag = block.value(Op::Still);
         let then = block.constant(Literal::nearest(scalar, 0.0));
@@ -132,9 +164,8 @@ fn residual(scalar: Scalar, head: &Residual, block: &mut Block) -> ValueId {
 }
 
 /// The duties of all actions, or of any other head the ends: all others lie between.
-pub fn duties(policy: &Policy) -> Vec<Literal> {
-    let scalar = policy.numeric_format.scalar();
-    match &policy.head {
+pub fn duties(scalar: Scalar, head: &policy::Head) -> Vec<Literal> {
+    match head {
         policy::Head::Choice(actions) => {
             let duty = |action: &policy::Action| Literal::nearest(scalar, action.duty);
             actions.iter().map(duty).collect()
@@ -144,6 +175,7 @@ pub fn duties(policy: &Policy) -> Vec<Literal> {
             vec![low, high]
         }
         policy::Head::Continuous(head) => ends(scalar, head).to_vec(),
+        policy::Head::Several(outputs) => outputs.iter().flat_map(|own| duties(scalar, &own.head)).collect(),
     }
 }
 

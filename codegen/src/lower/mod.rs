@@ -22,7 +22,8 @@ use crate::crc::{crc32_words, nibble_table};
 use crate::files::TOOL;
 use crate::output::Language;
 use crate::program::{
-    Coefficient, Conversion, Element, Head, Literal, MappingCode, Program, Provenance, SignalPort, Table,
+    Coefficient, Conversion, Element, Head, HeadPart, Literal, MappingCode, OutputCode, Program, Provenance,
+    SignalPort, Table,
 };
 
 /// Lowers a policy for a target; the loops of its network are those that suit the language's compilers.
@@ -34,13 +35,16 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
     let head = head::lower(policy);
     // on the finished tables: the answers are those of what is printed, not of the policy a second time
     let answers = known_answers::lower(policy, &network, &tables);
-    if let Head::Choice(duties) = &head {
-        tables.push(Table {
-            // a flipped duty would be commanded as it is
-            is_checked: true,
-            ..Table::plain("duties", Element::Float(scalar), duties.iter().copied())
-        });
+    let duties = |name: &str, duties: &[Literal]| Table {
+        // a flipped duty would be commanded as it is
+        is_checked: true,
+        ..Table::plain(name, Element::Float(scalar), duties.iter().copied())
+    };
+    if let Head::Choice(own) = &head {
+        tables.push(duties("duties", own));
     }
+    let choices = head.parts().iter().enumerate().filter(|(_, part)| part.is_choice());
+    tables.extend(choices.map(|(index, part)| duties(&HeadPart::table(index), &part.duties)));
     // what follows needs no check: a wrong step gives another checksum, a wrong answer fails the self test
     tables.push(Table::words("crc_steps", &nibble_table()));
     tables.extend(answers);
@@ -50,9 +54,9 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
     let signals: Vec<SignalPort> = (policy.signals.iter())
         .map(|signal| signal_port(scalar, signal))
         .collect();
-    let mapping = policy.mapping.as_ref().map(|map| mapping(scalar, map));
+    let outputs = outputs(policy);
     let guard = guard::lower(policy, &signals);
-    let state = state::members(policy, &signals, memory_words, mapping.as_ref());
+    let state = state::members(policy, &signals, memory_words, &outputs);
     Program {
         name: policy.name.clone(),
         sample_period: policy.sample_period,
@@ -78,16 +82,25 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         front,
         network,
         head,
-        mapping,
+        outputs,
         decide: command::decide(policy),
         guard,
         advance: command::advance(policy),
         state,
-        fallback_duty: Literal::nearest(scalar, policy.fallback.duty),
         hold: policy.fallback.hold,
         tables,
         crc,
     }
+}
+
+fn outputs(policy: &Policy) -> Vec<OutputCode> {
+    let scalar = policy.numeric_format.scalar();
+    let output = |path: policy::DutyPath<'_>| OutputCode {
+        name: path.name.map(str::to_owned),
+        mapping: path.mapping.map(|map| mapping(scalar, map)),
+        fallback: Literal::nearest(scalar, path.fallback),
+    };
+    policy.paths().into_iter().map(output).collect()
 }
 
 fn signal_port(scalar: Scalar, signal: &policy::Signal) -> SignalPort {

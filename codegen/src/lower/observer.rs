@@ -33,7 +33,7 @@ impl Builder {
         let first = self.reserve(observer.words());
         let kept = [0, 1, 2].map(|word| self.block.value(Op::Memory(first + word)));
         let now = Drive {
-            duty: self.block.value(Op::PreviousCommand),
+            duty: self.block.value(Op::PreviousCommand(0)),
             load_current: self.signals[observer.load_current],
             input_voltage: self.input_voltage(observer, None),
         };

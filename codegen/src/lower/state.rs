@@ -2,14 +2,14 @@
 
 use policy::Policy;
 
-use crate::program::{Literal, MappingCode, SignalPort, StateMember, StateValue, bits};
+use crate::program::{Literal, OutputCode, SignalPort, StateMember, StateValue, bits};
 
 /// The members in contract order; numbers first, so that in binary64 they lie without a gap.
 pub fn members(
     policy: &Policy,
     signals: &[SignalPort],
     memory_words: usize,
-    mapping: Option<&MappingCode>,
+    outputs: &[OutputCode],
 ) -> Vec<StateMember> {
     let scalar = policy.numeric_format.scalar();
     let member = |name: &str, meaning, value| StateMember {
@@ -26,29 +26,29 @@ pub fn members(
         let meaning = "filters, in feature order, oldest first";
         members.push(member("memory", meaning, StateValue::Numbers(zeros)));
     }
-    let initial = policy.limits.initial_duty;
-    members.push(member(
-        "previous_duty",
-        "duty of the last chosen action",
-        number(initial),
-    ));
-    members.push(member("previous_command", "last command", number(initial)));
-    if let Some(soft) = policy.limits.soft_start {
-        members.push(member("soft_cap", "rising upper limit", number(soft.from)));
-    }
-    for (name, value, ..) in mapping.iter().flat_map(|mapping| &mapping.coefficients) {
-        let meaning = "coefficient of the duty ratio mapping";
-        let name = format!("mapping_{}", name.name());
-        members.push(member(&name, meaning, StateValue::Coefficient(*value)));
-    }
-    if let Some(mapping) = mapping {
+    let mut checks = Vec::new();
+    for (path, output) in policy.paths().iter().zip(outputs) {
+        let own = |name: &str, meaning, value| member(&output.named(name), meaning, value);
+        let initial = path.limits.initial_duty;
+        members.push(own("previous_duty", "duty of the last chosen action", number(initial)));
+        members.push(own("previous_command", "last command", number(initial)));
+        if let Some(soft) = path.limits.soft_start {
+            members.push(own("soft_cap", "rising upper limit", number(soft.from)));
+        }
+        let Some(mapping) = &output.mapping else { continue };
+        for (name, value, ..) in &mapping.coefficients {
+            let meaning = "coefficient of the duty ratio mapping";
+            let name = format!("mapping_{}", name.name());
+            members.push(own(&name, meaning, StateValue::Coefficient(*value)));
+        }
         let coefficients = mapping.coefficients.iter();
         let check = coefficients.fold(mapping.check_constant, |check, (_, value, ..)| {
             check ^ bits(scalar, value.value())
         });
         let meaning = "check word of the coefficients: a flipped bit of one of them is seen";
-        members.push(member("mapping_check", meaning, StateValue::Check(check)));
+        checks.push(own("mapping_check", meaning, StateValue::Check(check)));
     }
+    members.extend(checks);
     let meaning = "consecutive steps with an invalid sample";
     members.push(member("bad_count", meaning, StateValue::Word));
     members.push(member(

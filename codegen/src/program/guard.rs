@@ -45,12 +45,12 @@ pub enum Place {
         /// Words.
         count: usize,
     },
-    /// Duty of the last chosen action.
-    PreviousDuty,
-    /// Last command.
-    PreviousCommand,
-    /// Rising upper limit.
-    SoftCap,
+    /// Duty of the last chosen action, of the output of that index.
+    PreviousDuty(usize),
+    /// Last command, of the output of that index.
+    PreviousCommand(usize),
+    /// Rising upper limit, of the output of that index.
+    SoftCap(usize),
 }
 
 /// A range by the bits of its ends; the fewer instructions the more is known of it.

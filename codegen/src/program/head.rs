@@ -19,6 +19,36 @@ pub enum Head {
         /// The curve that each is taken through, if any.
         curves: Vec<Option<Activation>>,
     },
+    /// All outputs as numbers, some columns for each of several duties.
+    Several {
+        /// In the order of the duties.
+        parts: Vec<HeadPart>,
+        /// The curve that each column is taken through, if any.
+        curves: Vec<Option<Activation>>,
+    },
+}
+
+/// What decides one of several duties.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeadPart {
+    /// First column.
+    pub column: usize,
+    /// Duty per action; none where one column is a number.
+    pub duties: Vec<Literal>,
+}
+
+impl HeadPart {
+    /// Whether argmax decides.
+    #[must_use]
+    pub fn is_choice(&self) -> bool {
+        !self.duties.is_empty()
+    }
+
+    /// Name of the table of duties of the part of that index.
+    #[must_use]
+    pub fn table(index: usize) -> String {
+        format!("duties{index}")
+    }
 }
 
 impl Head {
@@ -28,7 +58,7 @@ impl Head {
         match self {
             Head::Choice(duties) => duties.len(),
             Head::Output { .. } => 1,
-            Head::Gains { curves } => curves.len(),
+            Head::Gains { curves } | Head::Several { curves, .. } => curves.len(),
         }
     }
 
@@ -37,7 +67,7 @@ impl Head {
     pub fn duties(&self) -> &[Literal] {
         match self {
             Head::Choice(duties) => duties,
-            Head::Output { .. } | Head::Gains { .. } => &[],
+            Head::Output { .. } | Head::Gains { .. } | Head::Several { .. } => &[],
         }
     }
 
@@ -53,10 +83,19 @@ impl Head {
         matches!(self, Head::Choice(_))
     }
 
-    /// Whether the outputs are gains.
+    /// Whether all outputs are handed on to the command as they are.
     #[must_use]
-    pub fn is_gains(&self) -> bool {
-        matches!(self, Head::Gains { .. })
+    pub fn hands_on_all(&self) -> bool {
+        matches!(self, Head::Gains { .. } | Head::Several { .. })
+    }
+
+    /// What decides each of several duties; nothing where there is one.
+    #[must_use]
+    pub fn parts(&self) -> &[HeadPart] {
+        match self {
+            Head::Several { parts, .. } => parts,
+            Head::Choice(_) | Head::Output { .. } | Head::Gains { .. } => &[],
+        }
     }
 
     /// The curves that it takes its outputs through.
@@ -65,7 +104,7 @@ impl Head {
         match self {
             Head::Choice(_) => &[],
             Head::Output { curve } => std::slice::from_ref(curve),
-            Head::Gains { curves } => curves,
+            Head::Gains { curves } | Head::Several { curves, .. } => curves,
         }
     }
 

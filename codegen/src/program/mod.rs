@@ -20,13 +20,14 @@ use policy::{Digests, NumericFormat, Scalar};
 use targets::Widths;
 
 pub use guard::{Guard, Guarded, Place, Within};
-pub use head::Head;
+pub use head::{Head, HeadPart};
 pub use literal::Literal;
 pub(crate) use literal::{bits, words};
 pub use loops::{Add, Arithmetic, Buffer, Cut, From, Inner, IntegerCode, IntegerInput, Kept, Layer, Loop};
 pub use loops::{Network, Part, Piece, Shape, Sink, Store, Sums, Turns};
 pub use ops::{
-    Advance, Block, Coefficient, Conversion, Decide, Front, Op, Push, SignalPort, StateMember, StateValue, ValueId,
+    Advance, Block, Coefficient, Conversion, Decide, Duty, Front, Op, Push, SignalPort, StateMember, StateValue,
+    ValueId,
 };
 pub use tables::{Element, Slice, Strip, Table};
 
@@ -39,6 +40,27 @@ pub struct MappingCode {
     pub valid_i_out: (Literal, Literal),
     /// What the bits of all coefficients are combined with, by exclusive or, into their check word.
     pub check_constant: u64,
+}
+
+/// A duty that leaves the controller.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutputCode {
+    /// Name; `None` where there is one output.
+    pub name: Option<String>,
+    /// Its mapping, if any.
+    pub mapping: Option<MappingCode>,
+    /// Duty without a usable measurement.
+    pub fallback: Literal,
+}
+
+impl OutputCode {
+    /// A name of generated code: `stem` where there is one output, `stem_left` of the output `left`.
+    #[must_use]
+    pub fn named(&self, stem: &str) -> String {
+        self.name
+            .as_ref()
+            .map_or(stem.to_owned(), |name| format!("{stem}_{name}"))
+    }
 }
 
 /// Where the program comes from and under which conditions its bits hold.
@@ -88,8 +110,8 @@ pub struct Program {
     pub network: Network,
     /// What the outputs of the network mean.
     pub head: Head,
-    /// Mapping, if any.
-    pub mapping: Option<MappingCode>,
+    /// The duties, at least one.
+    pub outputs: Vec<OutputCode>,
     /// Chosen duty to command.
     pub decide: Decide,
     /// What a sound state lies within.
@@ -98,8 +120,6 @@ pub struct Program {
     pub advance: Advance,
     /// State, in contract order.
     pub state: Vec<StateMember>,
-    /// Duty without a usable measurement.
-    pub fallback_duty: Literal,
     /// K of the contract.
     pub hold: u32,
     /// All constant tables; the integrity check takes those it covers in this order.
@@ -113,6 +133,31 @@ impl Program {
     #[must_use]
     pub fn scalar(&self) -> Scalar {
         self.numeric_format.scalar()
+    }
+
+    /// Whether there are several duties, each with a name.
+    #[must_use]
+    pub fn has_several(&self) -> bool {
+        self.outputs.len() > 1
+    }
+
+    /// A name of generated code that belongs to the output of that index.
+    #[must_use]
+    pub fn named(&self, stem: &str, output: usize) -> String {
+        self.outputs.get(output).map_or(stem.to_owned(), |own| own.named(stem))
+    }
+
+    /// Mapping of the one output, if any.
+    #[must_use]
+    pub fn mapping(&self) -> Option<&MappingCode> {
+        self.outputs.first()?.mapping.as_ref()
+    }
+
+    /// Duty of the one output without a usable measurement.
+    #[must_use]
+    pub fn fallback_duty(&self) -> Literal {
+        // there is at least one output
+        self.outputs.first().map_or(Literal::exact(0.0), |own| own.fallback)
     }
 
     /// Number of features.

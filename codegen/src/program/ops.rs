@@ -47,16 +47,16 @@ pub enum Op {
     Sanitised(usize),
     /// Word of the filter memory.
     Memory(usize),
-    /// State: duty of the last chosen action.
-    PreviousDuty,
-    /// State: last command.
-    PreviousCommand,
-    /// State: rising upper limit.
-    SoftCap,
-    /// State: coefficient of the mapping.
-    Coefficient(Coefficient),
-    /// Duty, or offset, of the action that argmax chose.
-    ChosenDuty,
+    /// State: duty of the last chosen action, of the output of that index.
+    PreviousDuty(usize),
+    /// State: last command, of the output of that index.
+    PreviousCommand(usize),
+    /// State: rising upper limit, of the output of that index.
+    SoftCap(usize),
+    /// State: coefficient of the mapping of the output of that index.
+    Coefficient(usize, Coefficient),
+    /// Duty, or offset, of the action that argmax chose for the output of that index.
+    ChosenDuty(usize),
     /// From `front`: what the law of a residual head or the base of a gain schedule says.
     Base,
     /// Flag from `front`: the dead zone of a residual head or a gain schedule.
@@ -65,7 +65,7 @@ pub enum Op {
     Factor(usize),
     /// The one output of a continuous head.
     Output,
-    /// An output of a gain schedule.
+    /// An output of the network where all are handed on: those of a gain schedule, or of several duties.
     Gain(usize),
     /// A value behind the curve that the program's head has for the output of that index.
     Squash(ValueId, usize),
@@ -326,14 +326,21 @@ pub struct Front {
 pub struct Decide {
     /// Straight-line code.
     pub block: Block,
-    /// Commanded duty if usable.
-    pub duty: ValueId,
-    /// What the commanded duty lies within, if it is a number.
+    /// What each output commands if usable, at least one.
+    pub duties: Vec<Duty>,
+    /// What a commanded duty lies within, if it is a number.
     pub within: Within,
-    /// Duty before the mapping if usable.
-    pub duty_sim: ValueId,
     /// Status bit number and its flag, for usable steps.
     pub status: Vec<(u32, ValueId)>,
+}
+
+/// The duty of an output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Duty {
+    /// Behind the limits.
+    pub duty: ValueId,
+    /// Before the mapping.
+    pub duty_sim: ValueId,
 }
 
 /// What `commit` remembers besides filters and duties.
@@ -341,8 +348,8 @@ pub struct Decide {
 pub struct Advance {
     /// Straight-line code.
     pub block: Block,
-    /// Next soft-start limit; `None` without a soft start.
-    pub soft_cap: Option<ValueId>,
+    /// Next soft-start limit of each output; `None` without a soft start.
+    pub soft_caps: Vec<Option<ValueId>>,
 }
 
 #[cfg(test)]

@@ -114,7 +114,7 @@ fn law(spec: Spec<'_>, state: &State, estimates: &[[Term; 4]], sensed: &mut Sens
         }
     };
     let (base, factors) = match &spec.policy.head {
-        Head::Choice(_) | Head::Continuous(_) => return,
+        Head::Choice(_) | Head::Continuous(_) | Head::Several(_) => return,
         Head::Residual(head) => {
             let (low, high) = spec.inwards(head.limits);
             let base = float.clamp(of(&head.base), low, high);
@@ -168,6 +168,8 @@ fn source(spec: Spec<'_>, expr: &Expr, state: &State, signals: &[Term], estimate
         Expr::Input(Input::Signal(index)) => signals[*index],
         Expr::Input(Input::PreviousDuty) => state.previous_duty,
         Expr::Input(Input::PreviousCommand) => state.previous_command,
+        // a specification is of one output: contracts with several are refused when they are read
+        Expr::Input(Input::OutputDuty(_) | Input::OutputCommand(_)) => state.previous_duty,
         Expr::Input(Input::Estimate(index, estimate)) => {
             let [current, voltage, bias, surplus] = estimates[*index];
             match estimate {

@@ -3,12 +3,13 @@
 use std::ops::Range;
 
 use policy::NamedTensor;
+use policy::limits::{MAX_ACTIONS, MAX_OUTPUTS, MIN_ACTIONS};
 use serde_json::Value;
 use toml_input::Message;
 
 use super::{box_ends, other, text};
 use crate::Options;
-use crate::actor::{self, Actor};
+use crate::actor::{self, Actor, Duty};
 use crate::network::{left_out, no_output};
 use crate::recognise::refused_continuous;
 
@@ -20,6 +21,8 @@ pub(super) struct Space {
     pub commands: Vec<Actor>,
     /// The outputs that are kept, if not all are.
     pub part: Option<Part>,
+    /// What each of several duties is, where all are kept.
+    pub several: Vec<Duty>,
 }
 
 /// Outputs that are kept.
@@ -61,6 +64,7 @@ pub(super) fn read(data: &Value, is_tanh: bool, options: &Options) -> Result<Spa
             actions,
             commands: Vec::new(),
             part: None,
+            several: Vec::new(),
         }),
         (Some(_), Some(output)) => Err(other(
             "--output picks one of several, and this model has one table of actions",
@@ -77,7 +81,7 @@ pub(super) fn read(data: &Value, is_tanh: bool, options: &Options) -> Result<Spa
     }
 }
 
-/// One command, or the one that is picked, or all of them as gains.
+/// One command, or the one that is picked, or all of them: each a duty, or as gains.
 fn commands(data: &Value, is_tanh: bool, options: &Options) -> Result<Space, Message> {
     // with a squash of its own, or with noise that depends on the state, the layers behind the mean are others
     let kwargs = data.get("policy_kwargs").unwrap_or(&Value::Null);
@@ -101,11 +105,16 @@ fn commands(data: &Value, is_tanh: bool, options: &Options) -> Result<Space, Mes
             actions: all,
             commands: ends.iter().map(of).collect(),
             part: None,
+            several: Vec::new(),
         });
     }
     let output = match (all, options.output) {
         (_, Some(output)) => output,
         (1, None) => 0,
+        (several, None) if several <= MAX_OUTPUTS => {
+            let duty = |ends| Duty::Command(of(ends));
+            return Ok(all_of(several, ends.iter().map(duty).collect()));
+        }
         (several, None) => return Err(actor::several(several)),
     };
     let own = ends.get(output).map(of).ok_or_else(|| no_output(output, all))?;
@@ -118,10 +127,21 @@ fn commands(data: &Value, is_tanh: bool, options: &Options) -> Result<Space, Mes
         actions: 1,
         commands: vec![own],
         part,
+        several: Vec::new(),
     })
 }
 
-/// One dimension of a MultiDiscrete. Its logits stand side by side with those of the others, and each dimension has an argmax of its
+/// All outputs, which decide several duties.
+fn all_of(outputs: usize, several: Vec<Duty>) -> Space {
+    Space {
+        actions: outputs,
+        commands: Vec::new(),
+        part: None,
+        several,
+    }
+}
+
+/// One dimension of a MultiDiscrete, or all. Its logits stand side by side with those of the others, and each dimension has an argmax of its
 /// own: what one of them chooses does not hang on the others.
 fn dimension(space: &Value, output: Option<usize>) -> Result<Space, Message> {
     let sizes = space.get("nvec").and_then(numbers);
@@ -137,11 +157,15 @@ fn dimension(space: &Value, output: Option<usize>) -> Result<Space, Message> {
     let output = match (all, output) {
         (_, Some(output)) => output,
         (1, None) => 0,
+        (2..=MAX_OUTPUTS, None) if sizes.iter().all(|size| (MIN_ACTIONS..=MAX_ACTIONS).contains(size)) => {
+            let tables = sizes.iter().copied().map(Duty::Table).collect();
+            return Ok(all_of(sizes.iter().sum(), tables));
+        }
         (_, None) => {
             return Err(other(
-                "this model has several tables of actions, and one duty is compiled",
+                "this model has several tables of actions that one contract does not hold",
                 &format!("a MultiDiscrete of {listed}"),
-                "one table",
+                "one table, or 2 to 16 tables of 2 to 256 actions",
             )
             .hint(
                 "say --output N if dimension N, counted from 0, is the duty: the others are left out. Where they add up to a duty, train with \
@@ -163,6 +187,7 @@ fn dimension(space: &Value, output: Option<usize>) -> Result<Space, Message> {
         actions,
         commands: Vec::new(),
         part,
+        several: Vec::new(),
     })
 }
 

@@ -150,7 +150,11 @@ pub fn filled(folder: &std::path::Path, new: &import::NewPolicy) -> policy::Poli
         text = next;
     }
     write(&folder.join("policy.toml"), text.replace("\"TODO\"", "0.5").as_bytes());
-    policy::load(&folder.join("policy.toml")).unwrap_or_else(|faults| panic!("{text}\n{faults}"))
+    let options = policy::ReadOptions {
+        several_outputs: true,
+        ..policy::ReadOptions::default()
+    };
+    policy::load_with(&folder.join("policy.toml"), &options).unwrap_or_else(|faults| panic!("{text}\n{faults}"))
 }
 
 /// Outputs of a checked policy in f64, by the plain product.

@@ -39,6 +39,8 @@ pub(crate) struct Surroundings<'a> {
     pub estimates: &'a [(String, Input)],
     pub parameters: &'a BTreeMap<String, f64>,
     pub period: Option<f64>,
+    /// Whether there are several outputs; the names of their duties stand among the estimates.
+    pub has_outputs: bool,
 }
 
 pub(crate) fn read<'a>(root: &mut Table<'a>, around: &Surroundings<'_>, faults: &mut Sink) -> Features<'a> {
@@ -114,6 +116,7 @@ pub(super) fn source(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut 
         signals: around.signals,
         estimates: around.estimates,
         parameters: around.parameters,
+        has_outputs: around.has_outputs,
     };
     match expression::parse(text, &scope) {
         // blanks collapse: the text ends in comments and in the digest, and a line break must not

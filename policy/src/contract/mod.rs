@@ -8,6 +8,7 @@ pub(crate) mod head;
 pub(crate) mod mapping;
 pub(crate) mod network;
 pub(crate) mod observers;
+pub(crate) mod outputs;
 pub(crate) mod protection;
 pub(crate) mod residual;
 pub(crate) mod schedule;

@@ -24,6 +24,32 @@ pub(crate) fn fallback(root: &mut Table<'_>, faults: &mut Sink) -> Option<Fallba
     })
 }
 
+/// The duty that one of several outputs falls back to.
+pub(crate) fn own_fallback(section: &mut Table<'_>, faults: &mut Sink) -> Option<f64> {
+    let hint = "each output says what it commands without a usable measurement: `fallback = { duty = 0.0 }`";
+    let mut own = section
+        .required("fallback", hint, faults)?
+        .table("fallback of an output", faults)?;
+    let duty = own.required("duty", hint, faults).and_then(|v| duty(&v, faults));
+    own.finish_with(faults, |key| {
+        (key == "hold").then(|| "samples are held for all outputs together: `hold` stands in [fallback]".to_owned())
+    });
+    duty
+}
+
+/// How many bad samples are bridged where each output has a fallback duty of its own.
+pub(crate) fn hold(root: &mut Table<'_>, faults: &mut Sink) -> Option<u32> {
+    let hint = "how many bad samples are bridged with the last good one: [fallback] with `hold = 3`";
+    let mut section = root.required("fallback", hint, faults)?.table("[fallback]", faults)?;
+    let hold = section
+        .required("hold", hint, faults)
+        .and_then(|v| v.integer(0..=MAX_HOLD, faults));
+    section.finish_with(faults, |key| {
+        (key == "duty").then(|| "each [[output]] has its own: `fallback = { duty = 0.0 }`".to_owned())
+    });
+    hold
+}
+
 /// The limits; `initial_duty` is the fallback duty where the contract does not give it.
 pub(crate) fn limits(root: &mut Table<'_>, fallback: Option<Fallback>, faults: &mut Sink) -> Option<Limits> {
     let hint = "give [limits] with `duty = [low, high]`";

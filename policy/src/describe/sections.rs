@@ -2,8 +2,8 @@
 
 use crate::describe::formula::formula;
 use crate::model::{
-    Circuit, Continuous, Estimate, Factor, Fallback, Head, Input, InputVoltage, Interval, Mapping, Observer, OnTime,
-    Policy, Residual, Schedule, Squash, Still,
+    Circuit, Continuous, DutyPath, Estimate, Factor, Head, Input, InputVoltage, Interval, Mapping, Observer, OnTime,
+    Output, Policy, Residual, Schedule, Squash, Still,
 };
 
 /// Characters of a line of actions, with which it still fits into a terminal beside its indentation.
@@ -136,6 +136,9 @@ pub fn network(policy: &Policy) -> String {
 /// Duties of the actions, several a line, or the formulas of a head without a choice.
 #[must_use]
 pub fn actions(policy: &Policy) -> String {
+    if let Head::Several(outputs) = &policy.head {
+        return outputs.iter().map(several).collect();
+    }
     if let Some(head) = policy.head.continuous() {
         return continuous(head);
     }
@@ -167,6 +170,29 @@ pub fn actions(policy: &Policy) -> String {
         line.push_str(&text);
     }
     out + &format!("  {line}\n")
+}
+
+/// What decides one of several outputs.
+fn several(output: &Output) -> String {
+    let columns = match output.head.outputs() {
+        1 => format!("column {}", output.column),
+        count => format!("columns {} to {}", output.column, output.column + count - 1),
+    };
+    let what = match output.head.continuous() {
+        Some(head) => {
+            let ends = output.head.duties().into_iter();
+            format!(
+                "continuous, duty = {}, in {}",
+                mapped_output(Some(head.squash), "y", (head.scale, head.offset)),
+                range(hull(ends.map(|duty| Interval { low: duty, high: duty })))
+            )
+        }
+        None => {
+            let duties: Vec<String> = output.head.actions().iter().map(|own| own.duty.to_string()).collect();
+            format!("argmax of {} duties: {}", duties.len(), duties.join(" "))
+        }
+    };
+    format!("\noutput {} ({columns} of the last layer)\n  {what}\n", output.name)
 }
 
 /// The law, where it is left alone, and the heading of the offsets.
@@ -251,7 +277,8 @@ fn mapped_output(squash: Option<Squash>, output: &str, (scale, offset): (f64, f6
 pub fn mapping(policy: &Policy) -> String {
     let of = |mapping: &Mapping| mapped(mapping, policy);
     let none = || "  none: duty = duty of the action\n".to_owned();
-    format!("\nmapping\n{}", policy.mapping.as_ref().map_or_else(none, of))
+    let one = |path: &DutyPath<'_>| format!("\n{}\n{}", heading("mapping", path), path.mapping.map_or_else(none, of));
+    policy.paths().iter().map(one).collect()
 }
 
 fn mapped(mapping: &Mapping, policy: &Policy) -> String {
@@ -283,9 +310,20 @@ fn mapped(mapping: &Mapping, policy: &Policy) -> String {
 /// Limits of the duty, and what is commanded without a measurement.
 #[must_use]
 pub fn limits(policy: &Policy) -> String {
-    let limits = &policy.limits;
+    let path = |path: &DutyPath<'_>| limits_of(path, policy.fallback.hold);
+    policy.paths().iter().map(path).collect()
+}
+
+/// `limits`, or `limits of left` where there are several outputs.
+fn heading(what: &str, path: &DutyPath<'_>) -> String {
+    path.name.map_or(what.to_owned(), |name| format!("{what} of {name}"))
+}
+
+fn limits_of(path: &DutyPath<'_>, hold: u32) -> String {
+    let (limits, duty) = (path.limits, path.fallback);
     let mut out = format!(
-        "\nlimits\n  duty in {}, {} before the first step\n",
+        "\n{}\n  duty in {}, {} before the first step\n",
+        heading("limits", path),
         range(limits.duty),
         limits.initial_duty
     );
@@ -295,7 +333,6 @@ pub fn limits(policy: &Policy) -> String {
     if let Some(soft) = limits.soft_start {
         out += &format!("  soft start: upper limit from {} in {} steps\n", soft.from, soft.steps);
     }
-    let Fallback { duty, hold } = policy.fallback;
     out + &format!("  invalid measurement: hold {hold} steps, then duty {duty}\n")
 }
 

@@ -20,7 +20,8 @@ impl Writer<'_> {
     pub fn passes_nan(&self) -> bool {
         let passes = |squash: Squash| matches!(squash, Squash::Clip(_) | Squash::Curve(Activation::Softsign));
         match &self.policy.head {
-            Head::Choice(_) | Head::Residual(_) => false,
+            // contracts with several outputs are refused when they are read
+            Head::Choice(_) | Head::Residual(_) | Head::Several(_) => false,
             Head::Continuous(head) => passes(head.squash),
             Head::Schedule(head) => head.gains.iter().any(|gain| gain.squash.is_none_or(passes)),
         }
@@ -41,6 +42,7 @@ impl Writer<'_> {
     pub fn answer(&self) -> Answer {
         match &self.policy.head {
             Head::Choice(_) | Head::Residual(_) => Answer::Index,
+            Head::Several(_) => Answer::Gains(self.policy.outputs()),
             Head::Continuous(_) => Answer::Output,
             Head::Schedule(head) => Answer::Gains(head.gains.len()),
         }

@@ -57,6 +57,7 @@ impl Number {
                 let duty = |s: f64| self.nearest(self.nearest(self.nearest(s) * scale) + offset);
                 vec![duty(ends.low), duty(ends.high)]
             }
+            Head::Several(outputs) => outputs.iter().flat_map(|output| self.duties(&output.head)).collect(),
         }
     }
 

@@ -179,6 +179,57 @@ pub enum HeadView {
     Output,
     /// All outputs, gains of a law.
     Gains,
+    /// All outputs, from which several duties are decided.
+    Several,
+}
+
+/// A function that sets the mapping of one of several outputs.
+#[derive(Debug, Clone)]
+pub struct SetMapping {
+    /// Name without the prefix.
+    pub function: String,
+    /// Parameters after the state.
+    pub parameters: String,
+}
+
+/// A duty of the command.
+#[derive(Debug, Clone)]
+pub struct DutyView {
+    /// Its place in the arrays of the command; empty where there is one duty.
+    pub place: String,
+    /// Value in a usable step.
+    pub duty: String,
+    /// Value before the mapping in a usable step.
+    pub duty_sim: String,
+    /// Value in any other step.
+    pub fallback: String,
+    /// Action index.
+    pub index: String,
+    /// Member of the state that remembers it before the mapping.
+    pub previous_duty: String,
+    /// Member of the state that remembers it.
+    pub previous_command: String,
+}
+
+/// A mapping.
+#[derive(Debug, Clone)]
+pub struct MappingView {
+    /// Function that sets it, without the prefix.
+    pub function: String,
+    /// Function that sees flipped bits, without the prefix.
+    pub flips: String,
+    /// Parameters after the state.
+    pub parameters: String,
+    /// Conditions under which they are taken.
+    pub conditions: Vec<String>,
+    /// Members of the state and the parameters that set them.
+    pub members: Vec<(String, &'static str)>,
+    /// Member of the check word.
+    pub check: String,
+    /// Check word of the coefficients in the state.
+    pub held: String,
+    /// The same of those that are given.
+    pub given: String,
 }
 
 /// `<name>.h`
@@ -188,7 +239,11 @@ pub struct Header {
     /// Names and banner.
     pub common: Common,
     /// Counts and limits: names without the prefix, and their values.
-    pub constants: Vec<(&'static str, String)>,
+    pub constants: Vec<(String, String)>,
+    /// Declarator behind what each of several outputs has; empty where there is one.
+    pub places: String,
+    /// Functions of several outputs that set a mapping.
+    pub mappings: Vec<SetMapping>,
     /// Status bits.
     pub status: Vec<StatusBit>,
     /// Members of the measurement.
@@ -251,26 +306,30 @@ pub struct Source {
     pub still: Option<String>,
     /// Declarations of `decide`.
     pub decide: Vec<String>,
-    /// Value of the duty in a usable step.
-    pub duty: String,
-    /// Value of the duty before the mapping in a usable step.
-    pub duty_sim: String,
-    /// Word whose sign bit is set if that is not within the limits.
+    /// Whether all outputs of the network are handed on to the command.
+    pub takes_outputs: bool,
+    /// Declarations of what argmax chose.
+    pub chosen: Vec<String>,
+    /// Whether argmax is a function over some of the outputs.
+    pub greedy: bool,
+    /// The duties of the command.
+    pub duties: Vec<DutyView>,
+    /// Word whose sign bit is set if one is not within its limits.
     pub duty_stray: String,
+    /// Whether mapping or soft start read the state.
+    pub reads_state: bool,
     /// Terms of a word whose sign bit is set if the state is not sound.
     pub guard: Vec<String>,
-    /// Check word of the coefficients in the state; empty without a mapping.
-    pub mapping_held: String,
-    /// The same of those that `set_mapping` is given.
-    pub mapping_given: String,
+    /// The mappings.
+    pub mappings: Vec<MappingView>,
     /// Largest count of bad steps.
     pub most_bad: String,
     /// Terms of the status word.
     pub status_terms: Vec<String>,
     /// Declarations of `advance`.
     pub advance: Vec<String>,
-    /// Next soft-start limit; empty without.
-    pub soft_cap: String,
+    /// Members of the state that hold a soft-start limit, and their next values.
+    pub soft_caps: Vec<(String, String)>,
     /// Filter memory updates.
     pub pushes: Vec<PushView>,
     /// Statements of `init`.
@@ -279,14 +338,8 @@ pub struct Source {
     pub reset: Vec<String>,
     /// Words of filter memory.
     pub memory_words: usize,
-    /// Conditions of `set_mapping`.
-    pub mapping_conditions: Vec<String>,
-    /// Coefficients that `set_mapping` sets.
-    pub mapping_names: Vec<&'static str>,
     /// Hold count.
     pub hold: String,
-    /// Fallback duty.
-    pub fallback: String,
     /// Tables of the integrity check.
     pub integrity: Vec<CrcItem>,
     /// Expected CRC-32.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use policy::{Policy, Scalar};
 
-use super::{Form, mapping_terms};
+use super::{Form, Settable, settable};
 use crate::protocol::{MAGIC, kind, purity, sample_words};
 
 /// Text of the driver for the generated `<name>.h`.
@@ -196,7 +196,10 @@ fn step(policy: &Policy, form: Form) -> String {
     let name = &policy.name;
     let macro_name = name.to_uppercase();
     let measurement = measurement(policy);
-    let purity_tests = purity_tests(name);
+    let outputs = policy.paths().len();
+    // several are arrays, and one is a member
+    let duties = if outputs == 1 { "&" } else { "" };
+    let purity_tests = purity_tests(name, outputs);
     let mask = form.purity_mask();
     format!(
         r#"static int read_measurement(void)
@@ -238,9 +241,9 @@ static void step(void)
     }}
     put_numbers(observation, {macro_name}_FEATURES);
     put_numbers(q, {macro_name}_ACTIONS);
-    put_numbers(&command.duty, 1u);
-    put_numbers(&command.duty_sim, 1u);
-    put_word(command.action_index);
+    put_numbers({duties}command.duty, {outputs}u);
+    put_numbers({duties}command.duty_sim, {outputs}u);
+    put({duties}command.action_index, {outputs}u);
     put_word(command.status);
     put_state();
     put_word(purity);
@@ -365,7 +368,7 @@ pub(super) fn measurement(policy: &Policy) -> String {
     text
 }
 
-fn purity_tests(name: &str) -> String {
+fn purity_tests(name: &str, outputs: usize) -> String {
     let purity_bits = [
         purity::OBSERVE_CHANGED_STATE,
         purity::EVAL_CHANGED_STATE,
@@ -376,9 +379,9 @@ fn purity_tests(name: &str) -> String {
     let [observe, eval, repeat, step, commit] = purity_bits;
     let same = |a: &str, b: &str| {
         format!(
-            "memcmp(&{a}.duty, &{b}.duty, sizeof(number))\n        \
-             || memcmp(&{a}.duty_sim, &{b}.duty_sim, sizeof(number))\n        \
-             || {a}.action_index != {b}.action_index || {a}.status != {b}.status"
+            "memcmp(&{a}.duty, &{b}.duty, {outputs}u * sizeof(number))\n        \
+             || memcmp(&{a}.duty_sim, &{b}.duty_sim, {outputs}u * sizeof(number))\n        \
+             || memcmp(&{a}.action_index, &{b}.action_index, {outputs}u * 4u) || {a}.status != {b}.status"
         )
     };
     let first_second = same("first", "second");
@@ -401,11 +404,25 @@ fn purity_tests(name: &str) -> String {
 
 fn set_mapping(policy: &Policy) -> String {
     let name = &policy.name;
-    let arguments = match mapping_terms(policy) {
-        Some(4) => "k(0u), k(1u), k(2u), k(3u)",
-        Some(_) => "k(0u), k(1u), k(2u)",
-        None => return "\nstatic int set_mapping(void)\n{\n    return 0;\n}\n".to_owned(),
+    let outputs = settable(policy);
+    if outputs.is_empty() {
+        return "\nstatic int set_mapping(void)\n{\n    return 0;\n}\n".to_owned();
+    }
+    let case = |own: &Settable| {
+        let (output, function) = (own.output, &own.function);
+        let arguments = match own.has_product {
+            true => "k(0u), k(1u), k(2u), k(3u)",
+            false => "k(0u), k(1u), k(2u)",
+        };
+        format!(
+            "    case {output}u:
+        (void){name}_{function}(&twin, {arguments});
+        put_word({name}_{function}(&state, {arguments}));
+        break;
+"
+        )
     };
+    let cases: String = outputs.iter().map(case).collect();
     format!(
         "
 static uint32_t coefficients[4u * NUMBER_WORDS];
@@ -417,11 +434,14 @@ static number k(uint32_t index)
 
 static int set_mapping(void)
 {{
-    if (!get(coefficients, 4u * NUMBER_WORDS)) {{
+    uint32_t output;
+    if (!get(&output, 1u) || !get(coefficients, 4u * NUMBER_WORDS)) {{
         return 0;
     }}
-    (void){name}_set_mapping(&twin, {arguments});
-    put_word({name}_set_mapping(&state, {arguments}));
+    switch (output) {{
+{cases}    default:
+        return 0;
+    }}
     put_state();
     return 1;
 }}

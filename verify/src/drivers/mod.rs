@@ -5,7 +5,7 @@ pub mod kit;
 pub mod measure;
 pub mod rust;
 
-use policy::Policy;
+use policy::{DutyPath, Policy};
 
 /// What a driver stands on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,10 +27,24 @@ impl Form {
     }
 }
 
-/// Whether `set_mapping` exists, and if it takes `r`.
-fn mapping_terms(policy: &Policy) -> Option<usize> {
-    policy
-        .mapping
-        .as_ref()
-        .map(|mapping| if mapping.coefficients.r.is_some() { 4 } else { 3 })
+/// An output whose mapping can be set.
+struct Settable {
+    /// Index among the outputs.
+    output: usize,
+    /// Function that sets it, without the policy's name.
+    function: String,
+    /// Whether it takes `r`.
+    has_product: bool,
+}
+
+fn settable(policy: &Policy) -> Vec<Settable> {
+    let paths = policy.paths();
+    let one = |(output, path): (usize, &DutyPath<'_>)| {
+        Some(Settable {
+            output,
+            function: path.named("set_mapping"),
+            has_product: path.mapping?.coefficients.r.is_some(),
+        })
+    };
+    paths.iter().enumerate().filter_map(one).collect()
 }

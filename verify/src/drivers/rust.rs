@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use policy::{Policy, Scalar};
 
-use super::{Form, mapping_terms};
+use super::{Form, Settable, settable};
 use crate::protocol::{MAGIC, kind, purity, sample_words};
 
 /// Text of the driver for the generated module in the file `path`, relative to the driver.
@@ -24,9 +24,10 @@ pub fn text(policy: &Policy, path: &str, form: Form) -> String {
 mod {name};
 
 use {name}::{{Command, Controller, IntegrityCheck, Measurement}};
-{words}{number}{HELPERS}
+{words}{number}{HELPERS}{parts}
 {step}{set_mapping}{main}"#,
         number = number(policy.numeric_format.scalar()),
+        parts = parts(policy),
         step = step(policy, form),
         set_mapping = set_mapping(policy),
         main = main(policy),
@@ -193,10 +194,34 @@ impl Driver {
     }
 }
 
-fn bits(command: &Command) -> ([[u32; NUMBER_WORDS]; 2], [u32; 2]) {
-    ([words_of(command.duty), words_of(command.duty_sim)], [command.action_index, command.status])
-}
 "#;
+
+/// The parts of a command as slices.
+fn parts(policy: &Policy) -> String {
+    let outputs = policy.paths().len();
+    let slice = |part: &str| match outputs {
+        1 => format!("core::slice::from_ref(&command.{part})"),
+        _ => format!("&command.{part}[..]"),
+    };
+    let [duty, duty_sim, action_index] = ["duty", "duty_sim", "action_index"].map(slice);
+    format!(
+        r#"
+fn duties(command: &Command) -> [&[Number]; 2] {{
+    [{duty}, {duty_sim}]
+}}
+
+fn indices(command: &Command) -> &[u32] {{
+    {action_index}
+}}
+
+fn is_same(a: &Command, b: &Command) -> bool {{
+    let [x, y] = [a, b].map(duties);
+    let bits = |x: &[Number], y: &[Number]| x.iter().zip(y).all(|(x, y)| words_of(*x) == words_of(*y));
+    bits(x[0], y[0]) && bits(x[1], y[1]) && indices(a) == indices(b) && a.status == b.status
+}}
+"#
+    )
+}
 
 /// The fields of a measurement from `words`.
 pub(super) fn measurement_fields(policy: &Policy) -> String {
@@ -241,9 +266,9 @@ impl Driver {{
         let first = self.state.eval(m);
         let second = self.state.eval(m);
         *purity |= flag(before != self.state.state_words(), {eval});
-        *purity |= flag(bits(&first) != bits(&second), {repeat});
+        *purity |= flag(!is_same(&first, &second), {repeat});
         let command = self.state.step(m);
-        *purity |= flag(bits(&first) != bits(&command), {step});
+        *purity |= flag(!is_same(&first, &command), {step});
         let third = self.twin.eval(m);
         self.twin.commit(m, &third);
         *purity |= flag(self.twin.state_words() != self.state.state_words(), {commit});
@@ -267,8 +292,11 @@ impl Driver {{
         let _: ([Number; {name}::FEATURES], [Number; {name}::ACTIONS]) = (observation, q);
         self.put_numbers(&observation);
         self.put_numbers(&q);
-        self.put_numbers(&[command.duty, command.duty_sim]);
-        self.put([command.action_index, command.status]);
+        for numbers in duties(&command) {{
+            self.put_numbers(numbers);
+        }}
+        self.put(indices(&command).iter().copied());
+        self.put([command.status]);
         self.put_state();
         self.put([purity]);
     }}
@@ -278,19 +306,27 @@ impl Driver {{
 }
 
 fn set_mapping(policy: &Policy) -> String {
-    let arguments = match mapping_terms(policy) {
-        Some(4) => "a, b, c, r",
-        Some(_) => "a, b, c",
-        None => return "\nimpl Driver {\n    fn set_mapping(&mut self, _: [u32; 4 * NUMBER_WORDS]) {\n        panic!(\"no mapping\");\n    }\n}\n".to_owned(),
+    let case = |own: &Settable| {
+        let (output, function) = (own.output, &own.function);
+        let arguments = if own.has_product { "a, b, c, r" } else { "a, b, c" };
+        format!(
+            "            {output} => {{
+                self.twin.{function}({arguments});
+                self.state.{function}({arguments})
+            }}
+"
+        )
     };
-    let unused = if arguments.ends_with('r') { "r" } else { "_" };
+    let cases: String = settable(policy).iter().map(case).collect();
     format!(
         r#"
 impl Driver {{
-    fn set_mapping(&mut self, words: [u32; 4 * NUMBER_WORDS]) {{
-        let [a, b, c, {unused}] = [0, 1, 2, 3].map(|n| number(&words[n * NUMBER_WORDS..]));
-        self.twin.set_mapping({arguments});
-        let accepted: bool = self.state.set_mapping({arguments});
+    fn set_mapping(&mut self, output: u32, words: [u32; 4 * NUMBER_WORDS]) {{
+        #[allow(unused_variables)]
+        let [a, b, c, r] = [0, 1, 2, 3].map(|n| number(&words[n * NUMBER_WORDS..]));
+        let accepted: bool = match output {{
+{cases}            _ => panic!("no mapping"),
+        }};
         self.put([accepted as u32]);
         self.put_state();
     }}
@@ -338,8 +374,9 @@ fn run() {{
                 driver.step(words);
             }}
             {set} => {{
+                let [output] = driver.get().expect(truncated);
                 let words = driver.get().expect(truncated);
-                driver.set_mapping(words);
+                driver.set_mapping(output, words);
             }}
             {reset} => {{
                 driver.state.reset();

@@ -151,7 +151,7 @@ fn coefficients(policy: &Policy, good: &[Sample]) -> Vec<Move> {
     let own = mapping.coefficients;
     let set = |[a, b, c, r]: [f64; 4]| {
         let r = own.r.map(|_| r);
-        Move::Do(Event::SetMapping { a, b, c, r })
+        Move::Do(Event::SetMapping { output: 0, a, b, c, r })
     };
     let own_values = [own.a, own.b, own.c, own.r.unwrap_or(0.0)].map(|value| scalar.nearest(value));
     let ranges = [mapping.adjust_a, mapping.adjust_b, mapping.adjust_c, mapping.adjust_r];

@@ -40,7 +40,7 @@ pub(super) fn duties(policy: &Policy, log: &Log, commanded: &[f64]) -> Option<Du
     let table = match &policy.head {
         Head::Choice(table) => table,
         Head::Residual(head) => return added(policy, head, log, commanded),
-        Head::Continuous(_) | Head::Schedule(_) => return None,
+        Head::Continuous(_) | Head::Schedule(_) | Head::Several(_) => return None,
     };
     let own: Vec<f64> = table.iter().map(|action| action.duty).collect();
     let (source, derived, pairs) = pairs(policy, log)?;

@@ -38,9 +38,11 @@ const WIDE_NANS: [u64; 7] = [
 impl Edges {
     /// The edges of signal `index`: its own, and those of the mapping's validity if it is the load current.
     pub fn new(policy: &Policy, index: usize) -> Self {
-        let mapping = policy.mapping.as_ref().filter(|mapping| mapping.load_current == index);
-        let valid = mapping.map(|mapping| mapping.valid_i_out);
-        let ends: Vec<f64> = valid.iter().flat_map(|valid| [valid.low, valid.high]).collect();
+        let mappings = policy.paths().into_iter().filter_map(|path| path.mapping);
+        let valid = mappings
+            .filter(|mapping| mapping.load_current == index)
+            .map(|mapping| mapping.valid_i_out);
+        let ends: Vec<f64> = valid.flat_map(|valid| [valid.low, valid.high]).collect();
         Self::of_signal(policy.numeric_format.scalar(), &policy.signals[index], &ends)
     }
 

@@ -14,7 +14,7 @@ mod tests;
 use std::ops::Range;
 
 use interp::{Controller, Real, Sample};
-use policy::{Interval, Policy, Scalar};
+use policy::{Interval, Mapping, Policy, Scalar};
 use random::{Random, SplitMix};
 
 use crate::codes::Grid;
@@ -31,6 +31,8 @@ pub enum Event {
     Step(Vec<Sample>),
     /// An attempt to replace the mapping coefficients, numbers of the format; `r` in the four-term form only.
     SetMapping {
+        /// Index of the output, 0 where there is one.
+        output: usize,
         /// Gain on the duty.
         a: f64,
         /// Per ampere.
@@ -98,6 +100,8 @@ pub struct Stream<'a> {
     /// Steps left in the burst of bad samples (positive) or in the gap after it.
     bad_left: usize,
     good_left: usize,
+    /// Outputs with a mapping, by index.
+    mapped: Vec<(usize, Mapping)>,
     /// Values kept for a while.
     plateau: Vec<Sample>,
     /// Events that come before anything random, last first.
@@ -131,6 +135,7 @@ impl<'a> Stream<'a> {
             left: (4 * (policy.fallback.hold as usize).saturating_add(4)).min(FIRST_SEGMENT),
             bad_left: 0,
             good_left: 0,
+            mapped: mapped(policy),
             plateau: Vec::new(),
             queued,
             codes: None,
@@ -156,7 +161,7 @@ impl<'a> Stream<'a> {
             self.queued.push(Event::Step(grid.samples(next)));
             return Event::Init;
         }
-        if self.policy.mapping.is_some() && self.rng.one_in(STEPS_PER_SET_MAPPING) {
+        if !self.mapped.is_empty() && self.rng.one_in(STEPS_PER_SET_MAPPING) {
             return self.set_mapping();
         }
         if self.rng.one_in(STEPS_PER_RESET) {
@@ -318,7 +323,12 @@ impl<'a> Stream<'a> {
 
     /// Valid, at the ends, just outside, not a number, or the policy's own coefficients again.
     fn set_mapping(&mut self) -> Event {
-        let Some(mapping) = &self.policy.mapping else {
+        // one mapping takes no draw: the streams of policies with one stay what they were
+        let own = match self.mapped.len() {
+            0 | 1 => 0,
+            count => self.rng.below(count),
+        };
+        let Some((output, mapping)) = self.mapped.get(own) else {
             return Event::Reset;
         };
         let (scalar, rng) = (self.scalar, &mut self.rng);
@@ -364,12 +374,22 @@ impl<'a> Stream<'a> {
         }
         let [a, b, c, r] = values;
         Event::SetMapping {
+            output: *output,
             a,
             b,
             c,
             r: own.r.map(|_| r),
         }
     }
+}
+
+/// Outputs with a mapping.
+fn mapped(policy: &Policy) -> Vec<(usize, Mapping)> {
+    let paths = policy.paths();
+    let paths = paths.iter().enumerate();
+    paths
+        .filter_map(|(index, path)| Some((index, *path.mapping?)))
+        .collect()
 }
 
 /// `x` in the unit of the signal as the sample that arrives in `scalar`: rounded, or the nearest ADC code.

@@ -23,7 +23,7 @@ use toml_input::{Fault, Message};
 use train::score::Scoring;
 use train::{Contract, Settings};
 
-use crate::arguments::{Diagnose, Train};
+use crate::arguments::{Diagnose, Foreign, Train};
 use crate::commands::train as training;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
@@ -114,8 +114,11 @@ pub fn run(options: &Diagnose, prepared: &Prepared, diagnosis: &Diagnosis) -> Re
         let asked = Train {
             settings: prepared.out.join(SETTINGS),
             out: policy.clone(),
+            // the extended plant is one of numbers
+            foreign: Foreign { run_fmu: false },
             seeds: Vec::new(),
             threads: 0,
+            tensorboard: None,
             resume: options.resume,
             json: false,
         };

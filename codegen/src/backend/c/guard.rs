@@ -4,15 +4,15 @@ use policy::Scalar;
 
 use super::number;
 use super::statements::unsigned;
-use crate::program::{Guarded, Place, Program, Within};
+use crate::program::{Guarded, MappingCode, Place, Program, Within};
 
 /// Terms of a word whose sign bit is set if a number of the state is outside.
 pub fn terms(program: &Program) -> Vec<String> {
     let n = &program.name;
     let terms = program.guard.numbers.iter().map(|guarded| term(program, guarded));
-    let flips = program.mapping.iter();
+    let flips = program.outputs.iter().filter(|output| output.mapping.is_some());
     terms
-        .chain(flips.map(|_| format!("{n}_any({n}_mapping_flips(state))")))
+        .chain(flips.map(|output| format!("{n}_any({n}_{}(state))", output.named("mapping_flips"))))
         .collect()
 }
 
@@ -30,14 +30,11 @@ pub fn stray(program: &Program, x: &str, within: Within) -> String {
     }
 }
 
-/// The check word of coefficients that stand behind `prefix`; empty without a mapping.
-pub fn check_word(program: &Program, prefix: &str) -> String {
+/// The check word of coefficients, each of which `place` names.
+pub fn check_word(program: &Program, mapping: &MappingCode, place: impl Fn(&str) -> String) -> String {
     let n = &program.name;
-    let Some(mapping) = &program.mapping else {
-        return String::new();
-    };
     let bits = mapping.coefficients.iter();
-    let bits = bits.map(|(name, ..)| format!(" ^ {n}_bits({prefix}{})", name.name()));
+    let bits = bits.map(|(name, ..)| format!(" ^ {n}_bits({})", place(name.name())));
     word(program.scalar(), mapping.check_constant) + &bits.collect::<String>()
 }
 
@@ -54,9 +51,9 @@ fn term(program: &Program, guarded: &Guarded) -> String {
             let bound = word(program.scalar(), bound);
             return format!("{n}_line_far(&state->memory[{first}], {count}u, {bound})");
         }
-        Place::PreviousDuty => "state->previous_duty".to_owned(),
-        Place::PreviousCommand => "state->previous_command".to_owned(),
-        Place::SoftCap => "state->soft_cap".to_owned(),
+        Place::PreviousDuty(output) => format!("state->{}", program.named("previous_duty", output)),
+        Place::PreviousCommand(output) => format!("state->{}", program.named("previous_command", output)),
+        Place::SoftCap(output) => format!("state->{}", program.named("soft_cap", output)),
     };
     stray(program, &place, guarded.within)
 }

@@ -1,5 +1,6 @@
 //! C99 that also compiles as C90 with `stdint.h` and as C++: one header, one source.
 
+mod duties;
 mod guard;
 mod integer;
 pub(super) mod number;
@@ -21,8 +22,7 @@ use crate::backend::banner;
 use crate::files::{CodegenError, GeneratedFiles};
 use crate::lower::STATUS;
 use crate::program::{
-    Arithmetic, Buffer, Coefficient, Element, Head, IntegerCode, Kept, Literal, Loop, Op, Program, StateMember,
-    StateValue,
+    Arithmetic, Buffer, Element, Head, HeadPart, IntegerCode, Kept, Literal, Loop, Op, Program, StateMember, StateValue,
 };
 use number::number;
 use statements::{Printer, float, unsigned};
@@ -67,7 +67,6 @@ fn tidy(text: &str) -> String {
 
 fn common(program: &Program) -> Common {
     let number = number::kind(program.scalar());
-    let parameters = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
     Common {
         name: program.name.clone(),
         upper: program.name.to_uppercase(),
@@ -76,10 +75,10 @@ fn common(program: &Program) -> Common {
             &format!("Controller {}", program.name),
             program.provenance.c_flags,
         ),
-        mapping_parameters: parameters
-            .map(|(name, ..)| format!("{} {}", number.name, name.name()))
-            .collect::<Vec<_>>()
-            .join(", "),
+        mapping_parameters: match program.has_several() {
+            true => String::new(),
+            false => duties::parameters(program, program.mapping()),
+        },
         number,
     }
 }
@@ -95,17 +94,21 @@ fn wide_char(program: &Program) -> Option<WideChar> {
 }
 
 fn header(program: &Program) -> Header {
-    let count = |name: &'static str, value: usize| (name, format!("{value}u"));
+    let count = |name: &str, value: usize| (name.to_owned(), format!("{value}u"));
+    let period = ("SAMPLE_PERIOD".to_owned(), format!("{:?}", program.sample_period));
+    let constants = vec![
+        count("SIGNALS", program.signals.len()),
+        count("FEATURES", program.feature_count()),
+        count("ACTIONS", program.head.outputs()),
+        count("STATE_WORDS", program.state_words()),
+        count("TABLE_NUMBERS", program.table_numbers()),
+        period,
+    ];
     Header {
         common: common(program),
-        constants: vec![
-            count("SIGNALS", program.signals.len()),
-            count("FEATURES", program.feature_count()),
-            count("ACTIONS", program.head.outputs()),
-            count("STATE_WORDS", program.state_words()),
-            count("TABLE_NUMBERS", program.table_numbers()),
-            ("SAMPLE_PERIOD", format!("{:?}", program.sample_period)),
-        ],
+        constants: constants.into_iter().chain(duties::places(program)).collect(),
+        places: duties::length(program),
+        mappings: duties::settable(program),
         status: STATUS
             .iter()
             .map(|bit| StatusBit {
@@ -130,6 +133,7 @@ fn head_view(program: &Program) -> HeadView {
         Head::Choice(_) => HeadView::Choice,
         Head::Output { .. } => HeadView::Output,
         Head::Gains { .. } => HeadView::Gains,
+        Head::Several { .. } => HeadView::Several,
     }
 }
 
@@ -201,13 +205,11 @@ fn source(program: &Program) -> Source {
     let front = &program.front;
     let operands = |ids: &[usize]| ids.iter().map(|id| sense.operand(*id)).collect();
     let pushed: Vec<usize> = front.pushes.iter().map(|push| push.value).collect();
-    let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
-    let soft_cap = program.advance.soft_cap.map(|value| advance.operand(value));
     let (answer, answered) = match program.head {
         Head::Choice(_) => ("uint32_t", "index"),
         Head::Output { .. } => (number::kind(program.scalar()).name, "output"),
         // the template makes an array of them
-        Head::Gains { .. } => (number::kind(program.scalar()).name, "outputs"),
+        Head::Gains { .. } | Head::Several { .. } => (number::kind(program.scalar()).name, "outputs"),
     };
     Source {
         common: common(program),
@@ -231,28 +233,27 @@ fn source(program: &Program) -> Source {
         base: front.base.map(|value| sense.operand(value)),
         factors: operands(&front.factors),
         still: front.still.map(|flag| sense.operand(flag)),
-        duty: decide.operand(program.decide.duty),
-        duty_sim: decide.operand(program.decide.duty_sim),
-        duty_stray: guard::stray(program, &decide.operand(program.decide.duty), program.decide.within),
+        takes_outputs: program.head.hands_on_all(),
+        chosen: duties::chosen(program),
+        greedy: program.head.parts().iter().any(HeadPart::is_choice),
+        duties: duties::commanded(program, &decide),
+        duty_stray: duties::stray(program, &decide),
+        reads_state: duties::reads_state(program),
         guard: guard::terms(program),
-        mapping_held: guard::check_word(program, "state->mapping_"),
-        mapping_given: guard::check_word(program, ""),
+        mappings: duties::mappings(program),
         most_bad: unsigned(program.guard.bad_count),
         status_terms: bits
             .map(|(bit, flag)| format!("({} << {bit})", decide.operand(*flag)))
             .collect(),
         sense: sense.lines,
         decide: decide.lines,
-        soft_cap: soft_cap.unwrap_or_default(),
+        soft_caps: duties::soft_caps(program, &advance),
         advance: advance.lines,
         pushes: pushes(program),
         init,
         reset,
         memory_words: program.memory_words,
-        mapping_conditions: mapping_conditions(program),
-        mapping_names: coefficients.map(|(name, ..)| name.name()).collect(),
         hold: unsigned(program.hold),
-        fallback: number(program.scalar(), program.fallback_duty),
         integrity: tables::integrity(program),
         crc: unsigned(program.crc),
         self_test: tables::self_test(program.scalar()),
@@ -301,27 +302,6 @@ fn pushes(program: &Program) -> Vec<PushView> {
         index,
     };
     program.front.pushes.iter().enumerate().map(view).collect()
-}
-
-fn mapping_conditions(program: &Program) -> Vec<String> {
-    let scalar = program.scalar();
-    let Some(mapping) = &program.mapping else {
-        return Vec::new();
-    };
-    let p = &program.name;
-    let within = |(name, _, low, high): &(Coefficient, _, Literal, Literal)| {
-        let (name, low, high) = (name.name(), number(scalar, *low), number(scalar, *high));
-        format!("{p}_within({name}, {low}, {high})")
-    };
-    let mut conditions: Vec<String> = mapping.coefficients.iter().map(within).collect();
-    if mapping.coefficients.iter().any(|(name, ..)| *name == Coefficient::R) {
-        let (low, high) = mapping.valid_i_out;
-        for end in [low, high] {
-            let zero = number(scalar, Literal::nearest(scalar, 0.0));
-            conditions.push(format!("{p}_flag((a + (r * {})) > {zero})", number(scalar, end)));
-        }
-    }
-    conditions
 }
 
 fn helpers(program: &Program) -> Helpers {

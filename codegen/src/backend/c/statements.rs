@@ -112,11 +112,12 @@ impl<'p> Printer<'p> {
             Op::Held(i) => format!("state->held[{i}]"),
             Op::Sanitised(i) => format!("front->signal[{i}]"),
             Op::Memory(i) => format!("state->memory[{i}]"),
-            Op::PreviousDuty => "state->previous_duty".into(),
-            Op::PreviousCommand => "state->previous_command".into(),
-            Op::SoftCap => "state->soft_cap".into(),
-            Op::Coefficient(name) => format!("state->mapping_{}", name.name()),
-            Op::ChosenDuty => "chosen".into(),
+            Op::PreviousDuty(output) => self.remembered("previous_duty", *output),
+            Op::PreviousCommand(output) => self.remembered("previous_command", *output),
+            Op::SoftCap(output) => self.remembered("soft_cap", *output),
+            Op::Coefficient(output, name) => self.remembered(&format!("mapping_{}", name.name()), *output),
+            Op::ChosenDuty(output) if self.program.has_several() => format!("chosen{output}"),
+            Op::ChosenDuty(_) => "chosen".into(),
             Op::Output => "output".into(),
             Op::Gain(i) => format!("outputs[{i}]"),
             Op::Factor(i) => format!("front->factor[{i}]"),
@@ -131,6 +132,11 @@ impl<'p> Printer<'p> {
             Op::PrimedNow => "front->primed_now".into(),
             _ => return None,
         })
+    }
+
+    /// A member of the state that belongs to an output.
+    fn remembered(&self, stem: &str, output: usize) -> String {
+        format!("state->{}", self.program.named(stem, output))
     }
 
     fn computed(&self, op: &Op) -> String {

@@ -45,7 +45,7 @@ pub fn of(program: &Program, block: &BlockView) -> (Vec<VariableView>, String) {
             ..plain("output", "discrete", format!("outputs[{index}]")).meaning(meaning)
         });
     }
-    let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
+    let coefficients = program.mapping().into_iter().flat_map(|mapping| &mapping.coefficients);
     for (index, (name, value, low, high)) in coefficients.enumerate() {
         let [value, low, high] = [value, low, high].map(|literal| number(scalar, *literal));
         all.push(VariableView {

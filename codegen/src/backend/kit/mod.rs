@@ -88,7 +88,7 @@ fn core(program: &Program) -> Result<String, CodegenError> {
 }
 
 fn subject(kit: &str, program: &Program, trace: &Trace) -> Subject {
-    let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
+    let coefficients = program.mapping().into_iter().flat_map(|mapping| &mapping.coefficients);
     let coefficients: Vec<&str> = coefficients.map(|(name, ..)| name.name()).collect();
     let texts = Texts { kit, program };
     let (measurement, measurement_words) = texts.measurement();

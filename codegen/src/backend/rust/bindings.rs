@@ -222,7 +222,7 @@ fn state(program: &Program) -> State {
 
 /// Declaration and method that set the mapping's coefficients; nothing if the policy has no mapping.
 fn mapping(program: &Program) -> (TokenStream, TokenStream) {
-    let Some(mapping) = &program.mapping else {
+    let Some(mapping) = program.mapping() else {
         return (TokenStream::new(), TokenStream::new());
     };
     let symbol = format!("{}_set_mapping", program.name);

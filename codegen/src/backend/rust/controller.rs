@@ -7,8 +7,7 @@ use quote::quote;
 use super::number::{self, number};
 use super::statements::Printer;
 use super::tokens::{ident, size, word};
-use super::{guard, integrity, mapping, network, tables};
-use crate::lower::command;
+use super::{command, guard, integrity, mapping, network, tables};
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
 use crate::program::{Element, Literal, Program, StateMember, StateValue};
 
@@ -22,8 +21,8 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
     let lifecycle = lifecycle(program);
     let sense = sense(program);
     let sound = guard::method(program);
-    let decide = decide(program);
-    let advance = advance(program);
+    let decide = command::decide(program);
+    let advance = command::advance(program);
     let (eval, step) = bodies(program);
     let set_mapping = mapping::set_mapping(program);
     let checks = checks(program);
@@ -273,117 +272,6 @@ fn sense(program: &Program) -> TokenStream {
                 #factor
                 #still
             }
-        }
-    }
-}
-
-fn decide(program: &Program) -> TokenStream {
-    let decide = &program.decide;
-    let printer = Printer::new(program, &decide.block);
-    let statements = &printer.statements;
-    let duty = printer.operand(decide.duty);
-    let terms = decide.status.iter().map(|(bit, flag)| {
-        let (flag, bit) = (printer.operand(*flag), word(*bit));
-        quote!((#flag << #bit))
-    });
-    let fallback = number(program.scalar(), program.fallback_duty);
-    // shifted and not masked, which is an instruction less on Arm
-    let fallback_bit = word(command::bit("FALLBACK"));
-    // behind its limits, which lie within 0 and 1, a duty has the second highest bit only if it is no number
-    let stray = match program.scalar() {
-        Scalar::F32 => quote!((#duty.to_bits() >> 30)),
-        Scalar::F64 => quote!((#duty.to_bits() >> 62) as u32),
-    };
-    let network::Choice {
-        about,
-        about_apart,
-        kind,
-        name,
-        body,
-        index,
-    } = network::choice(program);
-    let number_kind = number::kind(program.scalar());
-    let duty_sim = printer.operand(decide.duty_sim);
-    let apart = program.senses_again.then(|| {
-        quote! {
-            #[doc = #about_apart]
-            // apart, so that its numbers are off the stack while the network runs
-            #[inline(never)]
-            fn choose_for(&self, measured: &Measurement) -> #kind {
-                Self::choose(&self.sense(measured).observation)
-            }
-            /// What a step does behind the network.
-            #[inline(never)]
-            fn settle(&mut self, measured: &Measurement, chosen: #kind) -> Command {
-                let (front, sound) = self.guarded(measured);
-                let command = self.decide(&front, sound, chosen);
-                self.advance(&front, sound, &command);
-                command
-            }
-        }
-    });
-    quote! {
-        #apart
-        #[doc = #about]
-        #[inline(always)]
-        fn choose(observation: &[#number_kind; FEATURES]) -> #kind {
-            #body
-        }
-        /// Mapping, limits, status.
-        #[inline(always)]
-        fn decide(&self, front: &Front, sound: u32, #name: #kind) -> Command {
-            #(#statements)*
-            let trusted = sound & !#stray;
-            let usable = front.usable & trusted;
-            let status = #(#terms)|*;
-            Command {
-                duty: select(usable, #duty, #fallback),
-                duty_sim: select(usable, #duty_sim, #fallback),
-                action_index: #index,
-                status: (status & 0_u32.wrapping_sub(usable))
-                    | ((usable ^ 1) << #fallback_bit)
-                    | (status::STATE & trusted.wrapping_sub(1)),
-            }
-        }
-    }
-}
-
-fn advance(program: &Program) -> TokenStream {
-    let printer = Printer::new(program, &program.advance.block);
-    let statements = &printer.statements;
-    let soft_cap = program.advance.soft_cap.map(|id| {
-        let value = printer.operand(id);
-        quote! { self.soft_cap = #value; }
-    });
-    let pushes = program.front.pushes.iter().enumerate().map(|(index, push)| {
-        let (first, last, length) = (size(push.word), size(push.word + push.length - 1), size(push.length));
-        let index = size(index);
-        if push.length == 1 {
-            return quote! { self.memory[#last] = select(sound, front.push[#index], 0.0); };
-        }
-        quote! {
-            let pushed = select(sound, front.push[#index], 0.0);
-            let mut moved = pushed;
-            for word in self.memory.iter_mut().skip(#first).take(#length).rev() {
-                let before = select(self.primed & sound, *word, pushed);
-                *word = moved;
-                moved = before;
-            }
-        }
-    });
-    quote! {
-        /// Filters, held samples and counters move on by one sample period.
-        #[inline(always)]
-        fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
-            #(#statements)*
-            #(#pushes)*
-            #soft_cap
-            self.held = front.signal;
-            self.previous_duty = command.duty_sim;
-            self.previous_command = command.duty;
-            self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
-            // 0 or 1; of a damaged state, which is never usable, 2
-            self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
         }
     }
 }

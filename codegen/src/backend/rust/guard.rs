@@ -4,35 +4,29 @@ use policy::Scalar;
 use proc_macro2::{Literal as Token, TokenStream};
 use quote::quote;
 
+use super::statements::remembered;
 use super::tokens::size;
 use super::{mapping, number};
 use crate::program::{Guarded, Place, Program, Within};
 
 /// The functions that compare, and the method that says whether the state is sound.
 pub fn method(program: &Program) -> TokenStream {
-    let terms = program
-        .guard
-        .numbers
-        .iter()
-        .map(|guarded| term(program.scalar(), guarded));
+    let terms = program.guard.numbers.iter().map(|guarded| term(program, guarded));
     let most = Token::u32_suffixed(program.guard.bad_count);
     let top = match program.scalar() {
         Scalar::F32 => quote!(stray),
         Scalar::F64 => quote!((stray >> 32) as u32),
     };
-    let flips = program
-        .mapping
-        .as_ref()
-        .map(|mapping| mapping::flips(program.scalar(), mapping));
+    let (flips, called): (Vec<_>, Vec<_>) = mapping::flips(program).into_iter().unzip();
     // the bits of `primed` above the lowest beside the flipped ones, where there are some: with a difference of their own they
     // take three instructions more
     let above = match program.scalar() {
         Scalar::F32 => quote!((self.primed >> 1)),
         Scalar::F64 => quote!(u64::from(self.primed >> 1)),
     };
-    let (coefficients, primed) = match flips {
-        Some(_) => (Some(quote!(| any(self.mapping_flips() | #above))), None),
-        None => (None, Some(quote!(| 1_u32.wrapping_sub(self.primed) | self.primed))),
+    let (coefficients, primed) = match called.is_empty() {
+        false => (Some(quote!(| any(#(self.#called() |)* #above))), None),
+        true => (None, Some(quote!(| 1_u32.wrapping_sub(self.primed) | self.primed))),
     };
     // each counter beside its difference: from 2^31 on the difference alone would look small again. The answer of `sound` stands
     // behind a barrier: of what is known to be 0 or 1 the optimiser makes a branch
@@ -40,7 +34,7 @@ pub fn method(program: &Program) -> TokenStream {
     // `damage` is a function of its own, so that its words have all registers: within a step they push the numbers of the
     // measurement onto the stack, which takes about 50 instructions more on a Cortex-M4F
     quote! {
-        #flips
+        #(#flips)*
         /// The sign bit is set if the state is not one that the controller can have written: a bit flipped that would decide the duty.
         #[inline(never)]
         fn damage(&self) -> u32 {
@@ -83,7 +77,8 @@ pub fn stray(scalar: Scalar, x: &TokenStream, within: Within) -> TokenStream {
     }
 }
 
-fn term(scalar: Scalar, guarded: &Guarded) -> TokenStream {
+fn term(program: &Program, guarded: &Guarded) -> TokenStream {
+    let scalar = program.scalar();
     let place = match guarded.place {
         Place::Held(index) => {
             let index = size(index);
@@ -99,9 +94,9 @@ fn term(scalar: Scalar, guarded: &Guarded) -> TokenStream {
             let one = stray(scalar, &quote!(*word), guarded.within);
             return quote!(self.memory.iter().skip(#first).take(#count).fold(0, |stray, word| stray | #one));
         }
-        Place::PreviousDuty => quote!(self.previous_duty),
-        Place::PreviousCommand => quote!(self.previous_command),
-        Place::SoftCap => quote!(self.soft_cap),
+        Place::PreviousDuty(output) => remembered(program, "previous_duty", output),
+        Place::PreviousCommand(output) => remembered(program, "previous_command", output),
+        Place::SoftCap(output) => remembered(program, "soft_cap", output),
     };
     stray(scalar, &place, guarded.within)
 }

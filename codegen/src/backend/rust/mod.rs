@@ -2,6 +2,7 @@
 
 #[cfg(all(feature = "c", feature = "rust-text"))]
 pub mod bindings;
+mod command;
 mod controller;
 mod guard;
 mod integer;
@@ -12,6 +13,7 @@ mod loops;
 mod mapping;
 mod network;
 pub(crate) mod number;
+mod several;
 mod statements;
 mod tables;
 pub(crate) mod tokens;
@@ -84,6 +86,7 @@ fn constants(program: &Program) -> TokenStream {
     };
     let state_words = size(program.state_words());
     let period = Literal::f64_unsuffixed(program.sample_period);
+    let places = program.has_several().then(|| places(program));
     let bits = STATUS.iter().map(|bit| {
         let (name, value) = (ident(bit.name), word(1 << bit.number));
         let meaning = format!(" {}", bit.meaning);
@@ -96,12 +99,29 @@ fn constants(program: &Program) -> TokenStream {
         pub const FEATURES: usize = #features;
         #[doc = #counted]
         pub const ACTIONS: usize = #actions;
+        #places
         /// Length of the state in words.
         pub const STATE_WORDS: usize = #state_words;
         /// Control period in seconds.
         pub const SAMPLE_PERIOD: f64 = #period;
         /// Bits of [`Command::status`].
         pub mod status { #(#bits)* }
+    }
+}
+
+/// The number of duties and the place of each in the arrays of a command.
+fn places(program: &Program) -> TokenStream {
+    let count = size(program.outputs.len());
+    let names = program.outputs.iter().filter_map(|output| output.name.as_ref());
+    let each = names.enumerate().map(|(index, name)| {
+        let (constant, index) = (ident(&format!("OUTPUT_{}", name.to_uppercase())), size(index));
+        let about = format!(" Place of `{name}` in the arrays of a [`Command`].");
+        quote! { #[doc = #about] pub const #constant: usize = #index; }
+    });
+    quote! {
+        /// Number of duties.
+        pub const OUTPUTS: usize = #count;
+        #(#each)*
     }
 }
 
@@ -124,7 +144,13 @@ fn types(program: &Program, layout: &TokenStream) -> TokenStream {
             " Duty of the law, before the mapping.",
             " Always 0: the network gives gains.",
         ],
-        Head::Choice(_) => [" Duty of the chosen action, before the mapping.", " Greedy action."],
+        Head::Choice(_) | Head::Several { .. } => {
+            [" Duty of the chosen action, before the mapping.", " Greedy action."]
+        }
+    };
+    let (duties, indices) = match program.has_several() {
+        true => (quote!([#number; OUTPUTS]), quote!([u32; OUTPUTS])),
+        false => (number.clone(), quote!(u32)),
     };
     quote! {
         /// One sample of every signal.
@@ -136,11 +162,11 @@ fn types(program: &Program, layout: &TokenStream) -> TokenStream {
         #layout
         pub struct Command {
             /// Commanded duty, 0..1: mapped and limited.
-            pub duty: #number,
+            pub duty: #duties,
             #[doc = #duty_sim]
-            pub duty_sim: #number,
+            pub duty_sim: #duties,
             #[doc = #action_index]
-            pub action_index: u32,
+            pub action_index: #indices,
             /// Bits of [`status`].
             pub status: u32,
         }

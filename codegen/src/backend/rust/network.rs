@@ -6,7 +6,7 @@ use quote::quote;
 
 use super::number;
 use super::tokens::size;
-use super::{integer, kernels, loops, tables};
+use super::{integer, kernels, loops, several, tables};
 use crate::activation::rust_curves;
 use crate::assembly;
 use crate::program::{Arithmetic, Program};
@@ -19,6 +19,7 @@ pub fn items(program: &Program) -> TokenStream {
         let duties = tables::values(program, "duties");
         quote! { static DUTIES: [#kind; ACTIONS] = #duties; }
     });
+    let several = several::items(program);
     let curves = rust_curves(program);
     let network = match &program.network.arithmetic {
         Arithmetic::Real { fused, .. } => real(program, *fused),
@@ -26,6 +27,7 @@ pub fn items(program: &Program) -> TokenStream {
     };
     quote! {
         #duties
+        #several
         #curves
         #network
     }
@@ -43,8 +45,10 @@ pub struct Choice {
     pub name: TokenStream,
     /// From `observation` to it.
     pub body: TokenStream,
-    /// The action index of a command from it.
-    pub index: TokenStream,
+    /// Statements of the command before all others.
+    pub chosen: Vec<TokenStream>,
+    /// The action index of each duty.
+    pub indices: Vec<TokenStream>,
 }
 
 /// The greedy action and its duty, or the output of a continuous head.
@@ -64,10 +68,11 @@ pub fn choice(program: &Program) -> Choice {
                 let outputs = network(observation);
                 #output
             },
-            index: quote!(0),
+            chosen: Vec::new(),
+            indices: vec![quote!(0)],
         };
     }
-    if program.head.is_gains() {
+    if program.head.hands_on_all() {
         let body = match &program.network.arithmetic {
             Arithmetic::Real { .. } => quote!(network(observation)),
             Arithmetic::Integer(code) => {
@@ -87,7 +92,8 @@ pub fn choice(program: &Program) -> Choice {
             kind: quote!([#kind; ACTIONS]),
             name: quote!(outputs),
             body,
-            index: quote!(0),
+            chosen: several::chosen(program),
+            indices: several::indices(program),
         };
     }
     // what argmax compares: a value below all others, and the name of the selection
@@ -116,7 +122,8 @@ pub fn choice(program: &Program) -> Choice {
             }
             (action_index, chosen)
         },
-        index: quote!(action_index & 0_u32.wrapping_sub(trusted)),
+        chosen: Vec::new(),
+        indices: vec![quote!(action_index & 0_u32.wrapping_sub(trusted))],
     }
 }
 

@@ -7,11 +7,17 @@ use quote::quote;
 use super::number::{self, number};
 use super::tokens::{ident, size};
 use crate::activation::{Rust, rust_lines};
-use crate::program::{Block, Coefficient, Op, Program, ValueId};
+use crate::program::{Block, Coefficient, Op, OutputCode, Program, ValueId};
 
-/// Field of the controller that holds a coefficient.
-pub fn coefficient_field(coefficient: Coefficient) -> Ident {
-    ident(&format!("mapping_{}", coefficient.name()))
+/// Field of the controller that holds a coefficient of an output.
+pub fn coefficient_field(output: &OutputCode, coefficient: Coefficient) -> Ident {
+    ident(&output.named(&format!("mapping_{}", coefficient.name())))
+}
+
+/// A field of the controller that belongs to the output of that index.
+pub fn remembered(program: &Program, stem: &str, output: usize) -> TokenStream {
+    let name = ident(&program.named(stem, output));
+    quote!(self.#name)
 }
 
 /// Prints one block inside a method of the controller; leaves stand where they are used.
@@ -74,14 +80,15 @@ impl<'p> Printer<'p> {
             Op::Held(i) => indexed(quote!(self.held), *i),
             Op::Sanitised(i) => indexed(quote!(front.signal), *i),
             Op::Memory(i) => indexed(quote!(self.memory), *i),
-            Op::PreviousDuty => quote!(self.previous_duty),
-            Op::PreviousCommand => quote!(self.previous_command),
-            Op::SoftCap => quote!(self.soft_cap),
-            Op::Coefficient(name) => {
-                let name = coefficient_field(*name);
-                quote!(self.#name)
+            Op::PreviousDuty(output) => remembered(self.program, "previous_duty", *output),
+            Op::PreviousCommand(output) => remembered(self.program, "previous_command", *output),
+            Op::SoftCap(output) => remembered(self.program, "soft_cap", *output),
+            Op::Coefficient(output, name) => remembered(self.program, &format!("mapping_{}", name.name()), *output),
+            Op::ChosenDuty(output) if self.program.has_several() => {
+                let name = ident(&format!("chosen{output}"));
+                quote!(#name)
             }
-            Op::ChosenDuty => quote!(chosen),
+            Op::ChosenDuty(_) => quote!(chosen),
             Op::Output => quote!(output),
             Op::Gain(i) => indexed(quote!(outputs), *i),
             Op::Factor(i) => indexed(quote!(front.factor), *i),

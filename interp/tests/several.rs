@@ -1,0 +1,155 @@
+//! Several outputs (contract section 9b), against values by hand.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::disallowed_methods)]
+
+use interp::{Command, Controller, InputError, Sample, status};
+use safetensors::Dtype;
+use safetensors::tensor::{TensorView, serialize};
+
+const CONTRACT: &str = r#"
+name = "two"
+sample_period = 1e-4
+
+[[signal]]
+name = "x"
+range = [-4.0, 4.0]
+
+[[feature]]
+name = "x"
+source = "x"
+
+[network]
+weights = "weights.safetensors"
+
+[[output]]
+name = "left"
+actions = { duties = [0.25, 0.5, 0.75] }
+limits = { duty = [0.0, 0.625] }
+fallback = { duty = 0.125 }
+
+[[output]]
+name = "right"
+actions = { continuous = { clip = [-1.0, 1.0], scale = 0.5, offset = 0.5 } }
+limits = { duty = [0.0, 1.0], slew = 0.25, initial_duty = 0.5 }
+fallback = { duty = 0.0625 }
+
+[fallback]
+hold = 1
+"#;
+
+/// One layer: Q of the choice is x, -x and 0.5, the continuous output is x / 4. All of it is exact.
+fn controller() -> Controller<f32> {
+    let folder = tempfile::tempdir().unwrap();
+    let weights: Vec<u8> = [1.0_f32, -1.0, 0.0, 0.25]
+        .iter()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
+    let bias: Vec<u8> = [0.0_f32, 0.0, 0.5, 0.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let tensors = [
+        ("out.weight", TensorView::new(Dtype::F32, vec![4, 1], &weights).unwrap()),
+        ("out.bias", TensorView::new(Dtype::F32, vec![4], &bias).unwrap()),
+    ];
+    std::fs::write(
+        folder.path().join("weights.safetensors"),
+        serialize(tensors, None).unwrap(),
+    )
+    .unwrap();
+    let path = folder.path().join("policy.toml");
+    std::fs::write(&path, CONTRACT).unwrap();
+    let options = policy::ReadOptions {
+        several_outputs: true,
+        ..policy::ReadOptions::default()
+    };
+    let policy = policy::load_with(&path, &options).unwrap_or_else(|faults| panic!("{faults}"));
+    Controller::new(&policy)
+}
+
+fn step(controller: &mut Controller<f32>, x: f32) -> Vec<Command<f32>> {
+    controller.step(&[Sample::Physical(x)]).unwrap().commands().collect()
+}
+
+fn duties(commands: &[Command<f32>]) -> Vec<f32> {
+    commands.iter().map(|command| command.duty).collect()
+}
+
+#[test]
+fn each_output_decides_by_its_own_columns_and_limits() {
+    let mut controller = controller();
+    // Q = 1, -1, 0.5: the first action; 0.5 * 0.25 + 0.5
+    let commands = step(&mut controller, 1.0);
+    assert_eq!(duties(&commands), [0.25, 0.625]);
+    assert_eq!(commands[0].status, status::PRIMED);
+    // Q = 0.25, -0.25, 0.5: the third action, cut off by the limits of left; right moves to 0.53125
+    let commands = step(&mut controller, 0.25);
+    assert_eq!((commands[0].action_index, commands[0].duty_sim), (2, 0.75));
+    assert_eq!(duties(&commands), [0.625, 0.53125]);
+    // one word for both: what left's limits did
+    assert!(commands.iter().all(|command| command.status == status::LIMITED));
+    // Q = -4, 4, 0.5: the second action; right wants 0 and moves by its slew limit from 0.53125
+    let commands = step(&mut controller, -4.0);
+    assert_eq!(duties(&commands), [0.5, 0.28125]);
+    assert!(commands.iter().all(|command| command.status == status::SLEW_LIMITED));
+}
+
+#[test]
+fn a_bad_sample_sends_every_output_to_its_own_fallback() {
+    let mut controller = controller();
+    step(&mut controller, 1.0);
+    // one bad sample is bridged with the 1 that is held, the next is not
+    let held = step(&mut controller, f32::NAN);
+    assert_eq!(duties(&held), [0.25, 0.625]);
+    let commands = step(&mut controller, f32::NAN);
+    assert_eq!(duties(&commands), [0.125, 0.0625]);
+    assert!(
+        commands
+            .iter()
+            .all(|command| command.status == status::FALLBACK && command.duty_sim == command.duty)
+    );
+    // the slew limit of right starts from what was commanded
+    let commands = step(&mut controller, 1.0);
+    assert_eq!(duties(&commands), [0.25, 0.3125]);
+}
+
+#[test]
+fn a_flip_in_the_state_of_one_output_stops_all() {
+    let mut controller = controller();
+    step(&mut controller, 1.0);
+    let mut state = controller.state().clone();
+    state.others[0].previous_command = f32::NAN;
+    assert!(controller.restore(&state));
+    let commands = step(&mut controller, 1.0);
+    assert_eq!(duties(&commands), [0.125, 0.0625]);
+    assert!(
+        commands
+            .iter()
+            .all(|command| command.status == status::FALLBACK | status::STATE)
+    );
+    assert!(commands.iter().all(|command| command.action_index == 0));
+    controller.reset();
+    assert_eq!(duties(&step(&mut controller, 1.0)), [0.25, 0.625]);
+}
+
+#[test]
+fn a_commit_needs_a_command_for_each_output() {
+    let mut controller = controller();
+    let sample = [Sample::Physical(1.0)];
+    let trace = controller.eval(&sample).unwrap();
+    let few = controller.commit(&sample, &trace.command).unwrap_err();
+    assert_eq!(few, InputError::CommandCount { expected: 2, found: 1 });
+    let mut twin = controller.clone();
+    let commands: Vec<_> = trace.commands().collect();
+    twin.commit_all(&sample, &commands).unwrap();
+    controller.step(&sample).unwrap();
+    assert_eq!(twin.state(), controller.state());
+    assert_eq!(
+        controller.state_names(),
+        [
+            "held.x",
+            "left.previous_duty",
+            "left.previous_command",
+            "right.previous_duty",
+            "right.previous_command",
+            "bad_count",
+            "primed"
+        ]
+    );
+}

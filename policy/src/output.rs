@@ -1,0 +1,101 @@
+//! Duties of a controller: one, or several that are decided from one network (contract section 9b).
+
+use serde::Serialize;
+
+use crate::head::Head;
+use crate::model::{Input, Limits, Mapping, Policy};
+
+/// One of several outputs: which columns of the last layer decide it, and what stands between them and the hardware.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Output {
+    /// Identifier in generated code: `[a-z][a-z0-9_]*`.
+    pub name: String,
+    /// First column of the last layer; the head has as many as it needs from there on.
+    pub column: usize,
+    /// What these columns mean: a choice of duties or a continuous head.
+    #[serde(serialize_with = "shown")]
+    pub head: Head,
+    /// Duty ratio mapping, if any.
+    #[serde(skip)]
+    pub mapping: Option<Mapping>,
+    /// Limits of the commanded duty.
+    pub limits: Limits,
+    /// Duty without a usable measurement, 0..1.
+    pub fallback: f64,
+}
+
+/// A head as the digest of a contract takes it; outputs have no other than these two.
+fn shown<S: serde::Serializer>(head: &Head, serializer: S) -> Result<S::Ok, S::Error> {
+    (head.actions(), head.continuous()).serialize(serializer)
+}
+
+/// The way of one duty from the network to the hardware, of a contract with one output as of one with several.
+#[derive(Debug, Clone, Copy)]
+pub struct DutyPath<'a> {
+    /// Name of the output; `None` where there is one.
+    pub name: Option<&'a str>,
+    /// First column of the last layer.
+    pub column: usize,
+    /// What the columns mean.
+    pub head: &'a Head,
+    /// Duty ratio mapping, if any.
+    pub mapping: Option<&'a Mapping>,
+    /// Limits of the commanded duty.
+    pub limits: &'a Limits,
+    /// Duty without a usable measurement.
+    pub fallback: f64,
+    /// How expressions call the duty before its mapping of the step before.
+    pub previous_duty: Input,
+    /// How they call the duty that left the controller.
+    pub previous_command: Input,
+}
+
+impl DutyPath<'_> {
+    /// Columns of the last layer.
+    #[must_use]
+    pub fn columns(&self) -> std::ops::Range<usize> {
+        self.column..self.column + self.head.outputs()
+    }
+
+    /// `stem` where there is one output, `stem_left` of the output `left`.
+    #[must_use]
+    pub fn named(&self, stem: &str) -> String {
+        self.name.map_or(stem.to_owned(), |name| format!("{stem}_{name}"))
+    }
+}
+
+impl Policy {
+    /// The outputs, of which one contract has one or several.
+    #[must_use]
+    pub fn paths(&self) -> Vec<DutyPath<'_>> {
+        let Head::Several(outputs) = &self.head else {
+            return vec![DutyPath {
+                name: None,
+                column: 0,
+                head: &self.head,
+                mapping: self.mapping.as_ref(),
+                limits: &self.limits,
+                fallback: self.fallback.duty,
+                previous_duty: Input::PreviousDuty,
+                previous_command: Input::PreviousCommand,
+            }];
+        };
+        let path = |(index, output): (usize, &'_ Output)| DutyPath {
+            name: Some(&outputs[index].name),
+            column: output.column,
+            head: &outputs[index].head,
+            mapping: outputs[index].mapping.as_ref(),
+            limits: &outputs[index].limits,
+            fallback: output.fallback,
+            previous_duty: Input::OutputDuty(index),
+            previous_command: Input::OutputCommand(index),
+        };
+        outputs.iter().enumerate().map(path).collect()
+    }
+
+    /// Names of several outputs; none where there is one.
+    #[must_use]
+    pub fn output_names(&self) -> Vec<&str> {
+        self.paths().into_iter().filter_map(|path| path.name).collect()
+    }
+}

@@ -1,0 +1,217 @@
+//! Several outputs in one contract: what is read, and what is refused at which place.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::{CONTRACT, Folder, assert_says, dense, words};
+use policy::{Fault, Faults, Head, Input, Output, Policy, ReadOptions};
+
+/// A choice of three and a continuous output behind one network.
+const OUTPUTS: &str = r#"[[output]]
+name = "left"
+actions = { duties = [0.44, 0.50, 0.56] }
+mapping = { file = "drm.toml", load_current = "i_out" }
+limits = { duty = [0.40, 0.60], slew = 0.02, initial_duty = 0.5 }
+fallback = { duty = 0.0 }
+
+[[output]]
+name = "right"
+actions = { continuous = { squash = "tanh", scale = 0.3, offset = 0.5 } }
+limits = { duty = [0.2, 0.8] }
+fallback = { duty = 0.25 }
+
+[fallback]
+hold = 3
+"#;
+
+/// The contract of the common tests with these outputs in the place of its own, over a last layer of `columns`.
+fn folder(columns: usize) -> Folder {
+    let (before, _) = CONTRACT.split_once("[actions]").unwrap();
+    let network = [dense("net.0", 4, 2), dense("net.2", columns, 4)].concat();
+    Folder::new().contract(&format!("{before}{OUTPUTS}")).tensors(&network)
+}
+
+fn load(folder: &Folder) -> Result<Policy, Faults> {
+    let options = ReadOptions {
+        several_outputs: true,
+        ..ReadOptions::default()
+    };
+    policy::load_with(&folder.path().join("policy.toml"), &options)
+}
+
+fn policy(folder: &Folder) -> Policy {
+    load(folder).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+fn outputs(policy: &Policy) -> &[Output] {
+    match &policy.head {
+        Head::Several(outputs) => outputs,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[track_caller]
+fn fault(folder: &Folder) -> Fault {
+    let faults = load(folder).expect_err("it is accepted");
+    assert_eq!(faults.faults.list.len(), 1, "{faults}");
+    faults.faults.list[0].clone()
+}
+
+#[test]
+fn each_output_has_columns_limits_fallback_and_mapping_of_its_own() {
+    let policy = policy(&folder(4));
+    let [left, right] = outputs(&policy) else {
+        panic!("{:?}", policy.head)
+    };
+    assert_eq!((left.name.as_str(), left.column, left.head.outputs()), ("left", 0, 3));
+    assert_eq!(
+        (right.name.as_str(), right.column, right.head.outputs()),
+        ("right", 3, 1)
+    );
+    assert_eq!((left.limits.slew, right.limits.slew), (Some(0.02), None));
+    assert_eq!((left.fallback, right.fallback, policy.fallback.hold), (0.0, 0.25, 3));
+    // as without outputs: the fallback duty, where the contract says no other
+    assert_eq!((left.limits.initial_duty, right.limits.initial_duty), (0.5, 0.25));
+    assert!(left.mapping.is_some() && right.mapping.is_none());
+    assert_eq!((policy.outputs(), policy.output_names()), (4, vec!["left", "right"]));
+    assert!(policy.digests.mapping.is_some());
+}
+
+#[test]
+fn columns_may_stand_in_another_order_than_the_outputs() {
+    let turned = folder(4)
+        .replace("name = \"left\"", "name = \"left\"\ncolumn = 1")
+        .replace("name = \"right\"", "name = \"right\"\ncolumn = 0");
+    let policy = policy(&turned);
+    let columns: Vec<_> = policy.paths().iter().map(|path| path.columns()).collect();
+    assert_eq!(columns, [1..4, 0..1]);
+}
+
+#[test]
+fn a_source_names_the_output_whose_duty_it_reads() {
+    let own = folder(4).replace(
+        "source = \"v_ref - v_out\"\nfilters",
+        "source = \"left_previous_duty - right_previous_command\"\nfilters",
+    );
+    let policy = policy(&own);
+    assert!(policy.reads(Input::OutputDuty(0)) && policy.reads(Input::OutputCommand(1)));
+    assert!(!policy.reads(Input::OutputCommand(0)) && !policy.reads(Input::PreviousDuty));
+    // left: 0.44 to 0.56 and 0, right: 0.2 to 0.8
+    let bound = policy.features[1].bound;
+    assert!(
+        (bound.low + 0.8).abs() < 1e-6 && (bound.high - 0.36).abs() < 1e-6,
+        "{bound:?}"
+    );
+    let vague = folder(4).replace(
+        "source = \"v_ref - v_out\"\nfilters",
+        "source = \"previous_duty\"\nfilters",
+    );
+    assert_says(
+        &fault(&vague),
+        &[
+            "does not say of which output",
+            "left_previous_duty or right_previous_duty",
+        ],
+    );
+}
+
+#[test]
+fn columns_that_overlap_lie_outside_or_do_not_fit_the_network_are_refused() {
+    let overlap = folder(4).replace("name = \"right\"", "name = \"right\"\ncolumn = 2");
+    assert_says(&fault(&overlap), &["decides two outputs", "columns 2 to 2 and 0 to 2"]);
+    let outside = folder(4).replace("name = \"right\"", "name = \"right\"\ncolumn = 7");
+    assert_says(&fault(&outside), &["outside of the last layer", "columns 7 to 7 of 4"]);
+    // the list has 4 columns, the network 5: said where a wrong number of actions is
+    let faults = load(&folder(5)).expect_err("a column that no output reads").to_string();
+    assert!(faults.contains('5') && faults.contains('4'), "{faults}");
+}
+
+#[test]
+fn what_an_output_lacks_or_has_too_much_is_said_at_its_place() {
+    let cases: [(&str, &str, &[&str]); 9] = [
+        (
+            "fallback = { duty = 0.25 }\n",
+            "",
+            &["`fallback` is missing", "each output"],
+        ),
+        (
+            "fallback = { duty = 0.25 }",
+            "fallback = { duty = 0.25, hold = 3 }",
+            &["unknown key `hold`", "[fallback]"],
+        ),
+        (
+            "hold = 3",
+            "hold = 3\nduty = 0.1",
+            &["unknown key `duty`", "each [[output]] has its own"],
+        ),
+        ("limits = { duty = [0.2, 0.8] }\n", "", &["`limits` is missing"]),
+        ("name = \"right\"", "name = \"left\"", &["`left` is used twice"]),
+        (
+            "name = \"right\"",
+            "name = \"Right\"",
+            &["cannot be the name of a output"],
+        ),
+        (
+            "continuous = { squash = \"tanh\", scale = 0.3, offset = 0.5 }",
+            "base = \"0.5\", offsets = [0.1]",
+            &["2 to"],
+        ),
+        (
+            "[fallback]\nhold",
+            "[limits]\nduty = [0.1, 0.9]\n\n[fallback]\nhold",
+            &["[limits] stands beside [[output]]"],
+        ),
+        (
+            "name = \"i_out\"\nunit = \"A\"",
+            "name = \"left_previous_duty\"\nunit = \"A\"",
+            &["used twice"],
+        ),
+    ];
+    for (from, to, expected) in cases {
+        let faults = load(&folder(4).replace(from, to)).expect_err(from);
+        let all: Vec<String> = faults.faults.list.iter().map(words).collect();
+        assert!(
+            expected.iter().all(|part| all.iter().any(|fault| fault.contains(part))),
+            "{from} -> {to}: {expected:?} not in {faults}"
+        );
+    }
+}
+
+#[test]
+fn a_law_an_observer_and_golden_answers_are_refused_with_the_way_out() {
+    let law = folder(4).replace(
+        "continuous = { squash = \"tanh\", scale = 0.3, offset = 0.5 }",
+        "base = \"0.5\", offsets = [-0.1, 0.1]",
+    );
+    assert!(
+        load(&law)
+            .unwrap_err()
+            .to_string()
+            .contains("a law of control has one output")
+    );
+    let golden = folder(4).golden(&[common::tensor("obs", &[3, 2]), common::tensor("output", &[3, 4])]);
+    assert_says(
+        &fault(&golden),
+        &["golden answers are compared for one output", "--output N"],
+    );
+}
+
+#[test]
+fn a_reader_that_knows_one_duty_refuses_several_by_name() {
+    let fault = folder(4).fault();
+    assert_says(
+        &fault,
+        &["several outputs", "left, right", "`policyc new MODEL --output N`"],
+    );
+}
+
+#[test]
+fn one_output_is_written_without_a_list() {
+    let (before, _) = CONTRACT.split_once("[actions]").unwrap();
+    let (one, _) = OUTPUTS.split_once("[[output]]\nname = \"right\"").unwrap();
+    let single = Folder::new().contract(&format!("{before}{one}[fallback]\nhold = 3\n"));
+    assert_says(
+        &fault(&single),
+        &["too few outputs", "[actions], [limits] and [fallback]"],
+    );
+}

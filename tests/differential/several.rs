@@ -1,0 +1,116 @@
+//! Several outputs from one network: generated code against the interpreter, every duty of every step.
+
+use policy::{Head, NumericFormat, Policy};
+
+use super::{COMPILERS, assert_equal, run};
+
+fn load(seed: u64) -> (tests::random::Folder, Policy) {
+    let folder = tests::several::policy(seed).unwrap();
+    let policy = policy::load_with(&folder.path(), &tests::several::options());
+    let policy = policy.unwrap_or_else(|faults| panic!("{}\n{faults}", folder.contract));
+    (folder, policy)
+}
+
+#[test]
+fn random_policies_with_several_outputs_are_equal_in_every_format() {
+    let count = if tests::full() { 60 } else { 6 };
+    for seed in 0..count {
+        let (folder, policy) = load(seed);
+        for (at, format) in NumericFormat::ALL.into_iter().enumerate() {
+            let compiler = COMPILERS[(seed as usize + at) % 3];
+            let report = run(&policy.clone().with_format(format), 1000, seed, &[compiler]);
+            assert_equal(&report, &format!("{} {compiler}\n{}", format.name(), folder.contract));
+        }
+    }
+}
+
+#[test]
+fn random_policies_with_several_outputs_reach_both_heads_every_limiter_and_two_to_four_outputs() {
+    let policies: Vec<Policy> = (0..60).map(|seed| load(seed).1).collect();
+    let outputs = |policy: &Policy| match &policy.head {
+        Head::Several(outputs) => outputs.clone(),
+        other => panic!("{other:?}"),
+    };
+    for count in 2..=4 {
+        assert!(policies.iter().any(|policy| outputs(policy).len() == count), "{count}");
+    }
+    let all: Vec<_> = policies.iter().flat_map(outputs).collect();
+    assert!(all.iter().any(|output| output.head.continuous().is_some()));
+    assert!(all.iter().any(|output| output.head.is_choice()));
+    assert!(all.iter().any(|output| output.limits.slew.is_some()));
+    assert!(all.iter().any(|output| output.limits.soft_start.is_some()));
+    assert!(all.iter().any(|output| output.mapping.is_some()) && all.iter().any(|output| output.mapping.is_none()));
+    let mixed = |policy: &&Policy| {
+        let own = outputs(policy);
+        own.iter().any(|output| output.head.is_choice()) && own.iter().any(|output| !output.head.is_choice())
+    };
+    assert!(policies.iter().filter(mixed).count() > 10);
+}
+
+#[test]
+fn an_output_that_passes_on_one_duty_refuses_several_by_name() {
+    use codegen::Output;
+    let (_folder, policy) = load(0);
+    let host = targets::find("host").unwrap();
+    for output in [
+        Output::Sfunction,
+        Output::Fmu2,
+        Output::Fmu3,
+        Output::Kit,
+        Output::RustOverC,
+    ] {
+        let refused = codegen::sources(&policy, host, &[output], None).expect_err(output.name());
+        let text = toml_input::Faults::from(refused).to_string();
+        for part in [output.name(), "passes on one duty", "left, right", "--output N"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+    }
+}
+
+/// Each of these would be silently wrong in a duty that is not the first.
+#[test]
+fn planted_defects_in_the_second_output_are_caught() {
+    let (_folder, policy) = (0..60)
+        .map(load)
+        .find(|(_, policy)| {
+            let paths = policy.paths();
+            paths[1].head.is_choice() && paths[1].limits.slew.is_some()
+        })
+        .expect("a policy whose second output is a choice with a slew limit");
+    let host = targets::find("host").unwrap();
+    let clean = codegen::sources(&policy, host, &[codegen::Output::C], None)
+        .unwrap()
+        .files;
+    let source = format!("{}.c", policy.name);
+    let column = policy.paths()[1].column;
+    let edits = [
+        // another column of the last layer
+        (
+            format!("_greedy(&outputs[{column}],"),
+            format!("_greedy(&outputs[{}],", column - 1),
+        ),
+        // remembered in the place of another output
+        ("command->duty[1];".to_owned(), "command->duty[0];".to_owned()),
+        // the slew limit around another output's command
+        (
+            "= command->duty_sim[1];".to_owned(),
+            "= command->duty_sim[0];".to_owned(),
+        ),
+    ];
+    for (from, to) in edits {
+        let text = &clean[&source];
+        assert!(text.contains(&from), "{from}\n{text}");
+        let mut files = clean.clone();
+        files.insert(source.clone(), text.replacen(&from, &to, 1));
+        let report = verify::run(
+            &policy,
+            verify::Options {
+                steps: 2000,
+                generated: Some(&files),
+                compilers: vec!["gcc".to_owned()],
+                ..verify::Options::default()
+            },
+        );
+        assert!(!report.unwrap().equal(), "{from} -> {to} was not seen");
+    }
+}

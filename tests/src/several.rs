@@ -1,0 +1,149 @@
+//! Policies with several outputs, drawn at random from a seed: choices and continuous heads mixed, each with limits, fallback and,
+//! mostly, a mapping of its own, and features that read the duty of one of them.
+
+use std::fmt::Write;
+
+use policy::Activation;
+use random::{Random, SplitMix};
+use safetensors::SafeTensorError;
+
+use crate::random::{Folder, action_table, continuous, feature, source, weights};
+
+/// Names of the outputs, as many as are drawn.
+const NAMES: [&str; 4] = ["left", "right", "mid", "spare"];
+
+/// Writes the policy of that seed into a temporary folder.
+///
+/// # Errors
+/// If the folder cannot be written.
+pub fn policy(seed: u64) -> std::io::Result<Folder> {
+    let folder = tempfile::tempdir()?;
+    let (contract, files) = files(seed).map_err(std::io::Error::other)?;
+    std::fs::write(folder.path().join("policy.toml"), &contract)?;
+    for (name, bytes) in files {
+        std::fs::write(folder.path().join(name), bytes)?;
+    }
+    Ok(Folder { folder, contract })
+}
+
+/// How a contract with several outputs is read.
+#[must_use]
+pub fn options() -> policy::ReadOptions {
+    policy::ReadOptions {
+        several_outputs: true,
+        ..policy::ReadOptions::default()
+    }
+}
+
+type Files = Vec<(String, Vec<u8>)>;
+
+fn files(seed: u64) -> Result<(String, Files), SafeTensorError> {
+    let mut rng = SplitMix::new(seed ^ 0x6475_7469_6573_0000);
+    let features = 2 + rng.below(6);
+    let count = 2 + rng.below(3);
+    let hidden: Vec<usize> = (0..1 + rng.below(3)).map(|_| 1 + rng.below(30)).collect();
+    let signals = 1 + rng.below(4);
+    let mut text = top(&mut rng, seed, signals);
+    for index in 0..features {
+        let own = source(&mut rng, signals);
+        let own = NAMES[..count].iter().fold(own, |own, _| {
+            let name = NAMES[rng.below(count)];
+            // a source has one of the words at most; a name that is there already begins with a letter before the word
+            match own.find(" previous_").or(own.starts_with("previous_").then_some(0)) {
+                Some(at) => {
+                    let (before, behind) = own.split_at(at);
+                    format!(
+                        "{before}{}",
+                        behind.replacen("previous_", &format!("{name}_previous_"), 1)
+                    )
+                }
+                None => own,
+            }
+        });
+        feature(&mut text, &mut rng, index, &own);
+    }
+    // one output always reads what another one commanded
+    text += &format!(
+        "[[feature]]\nname = \"told\"\nsource = \"{}_previous_command - {}_previous_duty\"\n\n",
+        NAMES[1], NAMES[0]
+    );
+    let _ = writeln!(text, "[network]\nweights = \"weights.safetensors\"");
+    let kinds = Activation::EACH;
+    let activations: Vec<String> = hidden.iter().map(|_| kinds[rng.below(kinds.len())].written()).collect();
+    let _ = writeln!(text, "hidden_activation = [{}]\n", activations.join(", "));
+    let mut columns = 0;
+    let mut files = Files::new();
+    for name in &NAMES[..count] {
+        let (output, width) = output(&mut rng, name, signals);
+        text += &output;
+        columns += width;
+    }
+    let (network, _) = weights(&mut rng, features + 1, &hidden, columns)?;
+    files.push(("weights.safetensors".to_owned(), network));
+    for name in &NAMES[..count] {
+        let (_, mapping) = weights(&mut rng, 1, &[], 1)?;
+        files.push((format!("{name}.toml"), mapping.into_bytes()));
+    }
+    let _ = writeln!(text, "[fallback]\nhold = {}", rng.below(6));
+    Ok((text, files))
+}
+
+/// Name, period, parameters and signals.
+fn top(rng: &mut SplitMix, seed: u64, signals: usize) -> String {
+    let mut text = format!(
+        "name = \"several{seed}\"\nsample_period = {:?}\n\n[parameters]\nk1 = {:?}\nk2 = {:?}\n\n",
+        rng.uniform(1e-5, 1e-3),
+        rng.uniform(-3.0, 3.0),
+        rng.uniform(0.5, 2.0)
+    );
+    for index in 0..signals {
+        let low = rng.uniform(-50.0, 10.0);
+        let _ = writeln!(
+            text,
+            "[[signal]]\nname = \"s{index}\"\nunit = \"V\"\nrange = [{low:?}, {:?}]\n",
+            low + rng.uniform(1.0, 200.0)
+        );
+    }
+    text
+}
+
+/// An output and the columns that it takes.
+fn output(rng: &mut SplitMix, name: &str, signals: usize) -> (String, usize) {
+    let mut text = format!("[[output]]\nname = \"{name}\"\n");
+    let width = if rng.one_in(2) { 1 } else { 2 + rng.below(7) };
+    match width {
+        1 => {
+            let _ = writeln!(text, "[output.actions]\n{}", continuous(rng));
+        }
+        count => {
+            let mut table = String::new();
+            action_table(&mut table, rng, count);
+            text += &table.replace("[actions]", "[output.actions]");
+        }
+    }
+    if !rng.one_in(3) {
+        let current = rng.below(signals);
+        let _ = writeln!(
+            text,
+            "[output.mapping]\nfile = \"{name}.toml\"\nload_current = \"s{current}\""
+        );
+    }
+    let (low, high) = (rng.uniform(0.0, 0.4), rng.uniform(0.6, 1.0));
+    let _ = writeln!(text, "[output.limits]\nduty = [{low:?}, {high:?}]");
+    if rng.one_in(2) {
+        let _ = writeln!(text, "slew = {:?}", rng.uniform(0.001, 0.2));
+    }
+    if rng.one_in(2) {
+        let from = rng.uniform(0.0, high);
+        let _ = writeln!(
+            text,
+            "soft_start = {{ from = {from:?}, steps = {} }}",
+            1 + rng.below(200)
+        );
+    }
+    if rng.one_in(2) {
+        let _ = writeln!(text, "initial_duty = {:?}", rng.uniform(0.0, 1.0));
+    }
+    let _ = writeln!(text, "[output.fallback]\nduty = {:?}\n", rng.uniform(0.0, 1.0));
+    (text, width)
+}

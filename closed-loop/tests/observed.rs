@@ -1,6 +1,6 @@
 //! Classical controllers behind the observer of a policy's contract.
 
-#![allow(clippy::unwrap_used)] // helpers of tests stand outside of #[test] functions
+#![allow(clippy::unwrap_used, clippy::disallowed_methods)] // helpers of tests stand outside of #[test] functions
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -149,6 +149,29 @@ fn statistics(file: &FileName, options: &Options) -> Result<Vec<DraftFeature>, F
     vecnormalize::read(&bytes).map_err(|message| name.fault(message).into())
 }
 
+/// The bytes of a file of golden answers, if there is one.
+type GoldenFile = Option<Vec<u8>>;
+
+/// The trainer's golden answers that lie beside the model, or those of the tensors as saved. None for several outputs: golden answers
+/// are compared for one.
+fn answers(
+    name: &FileName,
+    loaded: &Loaded,
+    network: &Network,
+    statistics: &[DraftFeature],
+    (inputs, actions): (usize, Option<usize>),
+) -> Result<(GoldenFile, GoldenFile), Faults> {
+    if !loaded.several.is_empty() {
+        return Ok((None, None));
+    }
+    let given = given_answers(name, inputs, actions)?;
+    let golden = match given {
+        Some(_) => None,
+        None => golden_answers(loaded, network, statistics).map_err(|message| name.fault(message))?,
+    };
+    Ok((given, golden))
+}
+
 /// A contract that names weights of its own.
 fn written(
     name: &FileName,
@@ -168,17 +191,7 @@ fn written(
     let outputs = network.layers.last().map_or(0, |layer| layer.outputs);
     // gains and one command are answered with other tensors than the values of actions
     let actions = (outputs > 1 && !options.gains).then_some(outputs);
-    // golden answers are compared for one output
-    let has_several = !loaded.several.is_empty();
-    let given = match has_several {
-        true => None,
-        false => given_answers(name, inputs, actions)?,
-    };
-    let golden = match given {
-        _ if has_several => None,
-        Some(_) => None,
-        None => golden_answers(loaded, network, statistics).map_err(|message| name.fault(message))?,
-    };
+    let (given, golden) = answers(name, loaded, network, statistics, (inputs, actions))?;
     let mut said = loaded.about.clone();
     said.extend(network.said.iter().cloned());
     let definition = network.definition.as_ref();
@@ -189,7 +202,7 @@ fn written(
         false => Vec::new(),
     };
     said.extend(actor.filter(|_| gains.is_empty()).map(actor::Actor::said));
-    if has_several {
+    if !loaded.several.is_empty() {
         let count = loaded.several.len();
         said.push(format!(
             "{count} outputs, each a duty of its own; `policyc new MODEL --output N` makes a contract for one of them, with golden answers"

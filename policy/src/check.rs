@@ -194,14 +194,9 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     let signals: Option<Vec<Signal>> = signals.list.into_iter().collect();
     let whole = observers.whole();
     let inputs = match (&signals, &whole, &limits, &fallback) {
-        (Some(signals), Some(whole), Some(limits), Some(fallback)) => Some(Inputs::new(
-            signals,
-            whole,
-            &duties,
-            several(&decided),
-            limits,
-            fallback,
-        )),
+        (Some(read), Some(whole), Some(limits), Some(fallback)) => {
+            Some(Inputs::new(read, whole, &duties, several(&decided), limits, fallback))
+        }
         _ => None,
     };
     let bounded = match (&inputs, head.sample_period) {
@@ -241,10 +236,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     ));
     // from here on whatever is missing has left its fault
     let limits = limits?;
-    match several(&decided) {
-        [] => notes.extend(on_duties(&limits, &duties, mapped, known)),
-        outputs => notes.extend(outputs.iter().flat_map(|output| of_output(output, known))),
-    }
+    notes.extend(on_outputs(&decided, &limits, &duties, mapped, known));
     let mut policy = Policy {
         name: head.name?,
         sample_period: head.sample_period?,
@@ -346,6 +338,20 @@ fn bound_law(raw: &RawPolicy, head: &Head, inputs: &Inputs, faults: &mut Sink) {
 }
 
 /// The notes on one of several outputs, each with its name.
+/// What is odd about the duties of the only output, or of each.
+fn on_outputs(
+    head: &Head,
+    limits: &Limits,
+    duties: &[f64],
+    mapping: Option<&Mapping>,
+    known: &[Feature],
+) -> Vec<String> {
+    match several(head) {
+        [] => on_duties(limits, duties, mapping, known),
+        outputs => outputs.iter().flat_map(|output| of_output(output, known)).collect(),
+    }
+}
+
 fn of_output(output: &Output, features: &[Feature]) -> Vec<String> {
     let notes = on_duties(&output.limits, &output.head.duties(), output.mapping.as_ref(), features);
     let named = notes

@@ -128,7 +128,9 @@ fn a_simulation_on_an_fmu_is_that_of_the_equal_plant() {
     desk.write("plant.toml", &format!("{PLANT}{lossless}"));
     desk.write(
         "same.toml",
-        &format!("{PLANT}").replace("f_sw = 10e3\n", "f_sw = 10e3\nrectifier = \"synchronous\"\n"),
+        &PLANT
+            .to_string()
+            .replace("f_sw = 10e3\n", "f_sw = 10e3\nrectifier = \"synchronous\"\n"),
     );
     let said = desk.succeed("simulate scenario.toml --policy buck12 --run-fmu --out loop");
     for words in ["foreign code", "buck.fmu", "nominal numbers"] {

@@ -90,12 +90,11 @@ pub(super) fn analyse(analysis: Analysis<'_>, stop: &Stop) -> Result<Found, prog
     Ok(found)
 }
 
-fn once(analysis: Analysis<'_>, precision: u8, stop: &Stop) -> Result<Found, program::Stopped> {
-    let begun = Instant::now();
+/// One run of Frama-C, which writes its findings to `table`.
+fn command(analysis: Analysis<'_>, precision: u8, table: &Path) -> Command {
     let Analysis {
         folder,
         policy,
-        labels,
         machine,
         numbers,
         ..
@@ -106,14 +105,9 @@ fn once(analysis: Analysis<'_>, precision: u8, stop: &Stop) -> Result<Found, pro
         merged,
         ..
     } = analysis.entry;
-    let table = folder.join(format!("{entry}-{}-{numbers:?}.csv", machine.0));
-    let finite = match numbers {
-        Numbers::Any => "",
-        Numbers::Finite => " -DFINITE",
-    };
-    let special = match numbers {
-        Numbers::Any => "none",
-        Numbers::Finite => "non-finite",
+    let (finite, special) = match numbers {
+        Numbers::Any => ("", "none"),
+        Numbers::Finite => (" -DFINITE", "non-finite"),
     };
     let mut command = Command::new(PROGRAM);
     // its own temporary files go with the folder, also when it is killed
@@ -155,7 +149,23 @@ fn once(analysis: Analysis<'_>, precision: u8, stop: &Stop) -> Result<Found, pro
         command.arg("-eva-use-spec").arg(format!("{policy}_{function}"));
     }
     command.args(["-eva-no-show-progress", "-eva-msg-key=-initial-state,-final-states"]);
-    command.arg("-then").arg("-report-csv").arg(&table);
+    command.arg("-then").arg("-report-csv").arg(table);
+    command
+}
+
+fn once(analysis: Analysis<'_>, precision: u8, stop: &Stop) -> Result<Found, program::Stopped> {
+    let begun = Instant::now();
+    let Analysis {
+        folder,
+        policy,
+        labels,
+        machine,
+        numbers,
+        ..
+    } = analysis;
+    let Entry { function, assumed, .. } = analysis.entry;
+    let table = folder.join(format!("{function}-{}-{numbers:?}.csv", machine.0));
+    let mut command = command(analysis, precision, &table);
     let output = program::run(&mut command, PATIENCE, stop);
     let seconds = begun.elapsed().as_secs_f64();
     let output = match output {

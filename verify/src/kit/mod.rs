@@ -146,11 +146,11 @@ mod tests {
             Op::Held(0),
             Op::Sanitised(0),
             Op::Memory(0),
-            Op::PreviousDuty,
-            Op::PreviousCommand,
-            Op::SoftCap,
-            Op::Coefficient(codegen::program::Coefficient::A),
-            Op::ChosenDuty,
+            Op::PreviousDuty(0),
+            Op::PreviousCommand(0),
+            Op::SoftCap(0),
+            Op::Coefficient(0, codegen::program::Coefficient::A),
+            Op::ChosenDuty(0),
             Op::Constant(Literal::nearest(Scalar::F32, 1.0)),
             Op::Neg(0),
             Op::Add(0, 0),
@@ -184,14 +184,15 @@ mod tests {
         for op in &all {
             match op {
                 Op::Measured(_) | Op::Code(_) | Op::Held(_) | Op::Sanitised(_) | Op::Memory(_) => {}
-                Op::PreviousDuty | Op::PreviousCommand | Op::SoftCap | Op::Coefficient(_) | Op::ChosenDuty => {}
+                Op::PreviousDuty(_) | Op::PreviousCommand(_) | Op::SoftCap(_) | Op::Coefficient(..) => {}
+                Op::ChosenDuty(_) => {}
                 Op::Constant(_) | Op::Neg(_) | Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Select { .. } => {}
                 Op::Clamp { .. } | Op::LineSum { .. } | Op::Primed | Op::Usable | Op::Clipped => {}
                 Op::HeldSample | Op::PrimedNow | Op::Within { .. } | Op::Outside { .. } => {}
                 Op::Difference(..) | Op::NotZero(_) | Op::Above(..) | Op::And(..) | Op::Or(..) => {}
                 // of a continuous head alone: where one is compiled, the moves of the policy itself run them
                 Op::Output | Op::Squash(..) => {}
-                // of a gain schedule alone, likewise
+                // of a gain schedule and of several outputs, likewise
                 Op::Gain(_) | Op::Factor(_) => {}
                 // of a law of control alone, likewise
                 Op::Base | Op::Still => {}

@@ -279,14 +279,3 @@ fn short_task() -> Task {
         ..Task::default()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::remaining;
-
-    #[test]
-    fn a_few_seconds_left_are_not_worth_a_word() {
-        assert_eq!(remaining(0.4), "");
-        assert_eq!(remaining(35.2), ", about 35 s left");
-    }
-}

@@ -1,58 +1,48 @@
 #!/usr/bin/env python3
-"""A moving picture of a command, from a real run in a terminal, such as docs/pictures/demo.gif.
+"""A moving picture of a command, from a real run in a terminal, such as docs/pictures/demo.svg.
 
-    pip install pyte pillow
-    tools/cast.py docs/pictures/demo.gif 104x30 'policyc demo --steps 2000'
+    pip install pyte
+    tools/cast.py docs/pictures/demo.svg 100x30 'policyc demo --steps 2000'
 
-The command runs in a pseudo-terminal of that size, and pyte plays the terminal. Every line becomes a frame. Pauses longer than two seconds are
-cut to two, and lines that come faster than the eye can follow stay for a tenth of a second. The font is DejaVu Sans Mono.
+The command runs in a pseudo-terminal of that width, and pyte plays the terminal. Each line appears when it appeared in the run; pauses are cut
+to a second and a half, and lines that come faster than the eye can follow are held for a tenth of a second. What does not play animations, such as
+print, shows the end.
 """
 
+import fcntl
+import html
 import os
 import pty
 import select
 import struct
 import sys
+import termios
 import time
 
-import fcntl
 import pyte
-import termios
-from PIL import Image, ImageDraw, ImageFont
 
-FONT = "/usr/share/fonts/truetype/dejavu/DejaVuSansMono.ttf"
-SIZE = 13
+SCROLLBACK = 400
+CHARACTER, LINE, MARGIN = 7.8, 18, 12
 BACK, FRONT = "#16181d", "#d8dbe2"
 COLORS = {
-    "default": FRONT, "black": "#16181d", "red": "#ff7b72", "green": "#7ee787", "brown": "#e3b341", "blue": "#79c0ff",
-    "magenta": "#d2a8ff", "cyan": "#76e3ea", "white": "#f0f3f6",
+    "red": "#ff7b72", "green": "#7ee787", "brown": "#e3b341", "blue": "#79c0ff", "magenta": "#d2a8ff", "cyan": "#76e3ea", "white": "#f0f3f6",
 }
-LONGEST_PAUSE, SHORTEST_FRAME, LAST_FRAME = 2.0, 0.1, 6.0
+LONGEST_PAUSE, SHORTEST = 1.5, 0.1
 
 
-def snapshot(screen):
-    """What the screen shows, as rows of (character, colour, bold)."""
-    return tuple(
-        tuple((screen.buffer[y][x].data, screen.buffer[y][x].fg, screen.buffer[y][x].bold) for x in range(screen.columns))
-        for y in range(screen.lines)
-    )
-
-
-def record(command, columns, lines):
-    """Pairs of time in s and what the screen showed then."""
-    screen = pyte.Screen(columns, lines)
+def record(command, columns):
+    """The rows that the command left on a terminal without end, and for each the time in s at which it had first something in it."""
+    screen = pyte.Screen(columns, SCROLLBACK)
     stream = pyte.ByteStream(screen)
     stream.feed(f"$ {command}\r\n".encode())
     pid, terminal = pty.fork()
     if pid == 0:
-        os.environ.update(TERM="xterm-256color", COLUMNS=str(columns), LINES=str(lines))
+        os.environ.update(TERM="xterm-256color", COLUMNS=str(columns), LINES=str(SCROLLBACK))
         os.execvp("sh", ["sh", "-c", command])
-    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
-    started = time.monotonic()
-    frames = [(0.0, snapshot(screen))]
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", SCROLLBACK, columns, 0, 0))
+    started, seen = time.monotonic(), {}
     while True:
-        ready, _, _ = select.select([terminal], [], [], 0.05)
-        if not ready:
+        if not select.select([terminal], [], [], 0.05)[0]:
             continue
         try:
             data = os.read(terminal, 65536)
@@ -60,38 +50,67 @@ def record(command, columns, lines):
             break
         if not data:
             break
-        for line in data.splitlines(keepends=True):
-            stream.feed(line)
-            shown = snapshot(screen)
-            if shown != frames[-1][1]:
-                frames.append((time.monotonic() - started, shown))
-    _, status = os.waitpid(pid, 0)
-    if os.waitstatus_to_exitcode(status) != 0:
-        sys.exit(f"`{command}` ended with {os.waitstatus_to_exitcode(status)}")
-    return frames
+        stream.feed(data)
+        for row in range(screen.cursor.y + 1):
+            seen.setdefault(row, time.monotonic() - started)
+    code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    if code != 0:
+        sys.exit(f"`{command}` ended with {code}")
+    rows = [[screen.buffer[y][x] for x in range(columns)] for y in range(screen.cursor.y)]
+    return rows, [seen.get(row, 0.0) for row in range(len(rows))]
 
 
-def held(frames):
-    """Pairs of a screen and how long it stays in s."""
-    ends = [at for at, _ in frames[1:]]
-    stays = [min(max(end - at, SHORTEST_FRAME), LONGEST_PAUSE) for (at, _), end in zip(frames, ends)] + [LAST_FRAME]
-    stays[0] = max(stays[0], 1.0)
-    return [(shown, stay) for (_, shown), stay in zip(frames, stays)]
+def paced(times):
+    """The times of a run that can be followed."""
+    now, before, out = 0.0, times[0], []
+    for at in times:
+        now += min(max(at - before, SHORTEST), LONGEST_PAUSE)
+        before = at
+        out.append(now)
+    return out
 
 
-def painted(shown, font):
-    width, height = round(font.getlength("m")), SIZE + 5
-    image = Image.new("RGB", (len(shown[0]) * width + 16, len(shown) * height + 16), BACK)
-    draw = ImageDraw.Draw(image)
-    for y, row in enumerate(shown):
-        for x, (character, color, bold) in enumerate(row):
-            if character.strip():
-                color = COLORS.get(color.removeprefix("bright"), f"#{color}" if len(color) == 6 else FRONT)
-                at = (8 + x * width, 8 + y * height)
-                draw.text(at, character, font=font, fill=color, stroke_width=0)
-                if bold:
-                    draw.text((at[0] + 0.5, at[1]), character, font=font, fill=color)
-    return image.quantize(colors=24)
+def spans(row):
+    """A row as runs of one colour."""
+    runs = []
+    for cell in row:
+        style = (COLORS.get(cell.fg.removeprefix("bright"), FRONT), cell.bold)
+        if runs and runs[-1][0] == style:
+            runs[-1][1] += cell.data
+        else:
+            runs.append([style, cell.data])
+    if runs:
+        runs[-1][1] = runs[-1][1].rstrip()
+    text = ""
+    for (color, bold), part in runs:
+        fill = "" if color == FRONT else f' fill="{color}"'
+        weight = ' font-weight="bold"' if bold else ""
+        text += f"<tspan{fill}{weight}>{html.escape(part)}</tspan>" if fill or weight else html.escape(part)
+    return text
+
+
+def drawn(command, rows, times, columns, lines):
+    width, height = columns * CHARACTER + 2 * MARGIN, lines * LINE + 2 * MARGIN
+    whole = times[-1] + 0.1
+    steps = [f"{100 * at / whole:.2f}%{{transform:translateY({-max(0, n + 1 - lines) * LINE}px)}}" for n, at in enumerate(times) if n + 1 > lines]
+    end = -max(0, len(rows) - lines) * LINE
+    out = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height}" role="img" aria-label="{html.escape(command)} in a terminal">',
+        f"<style>text{{font:13px ui-monospace,Menlo,Consolas,'DejaVu Sans Mono',monospace;fill:{FRONT};white-space:pre}}"
+        f".all{{transform:translateY({end}px);animation:s {whole:.1f}s step-end backwards}}.all text{{animation:a .01s step-end backwards}}"
+        "@keyframes a{from{visibility:hidden}}"
+        f"@keyframes s{{0%{{transform:translateY(0)}}{''.join(steps)}}}"
+        "@media (prefers-reduced-motion:reduce){.all,.all text{animation:none}}</style>",
+        f'<rect width="{width:.0f}" height="{height}" rx="8" fill="{BACK}"/>',
+        f'<svg x="{MARGIN}" y="{MARGIN}" width="{columns * CHARACTER:.0f}" height="{lines * LINE}"><g class="all">',
+    ]
+    for n, (row, at) in enumerate(zip(rows, times)):
+        text = spans(row)
+        if text:
+            delay = f' style="animation-delay:{at:.2f}s"' if n else ""
+            out.append(f'<text y="{n * LINE + 14}"{delay} textLength="{len("".join(c.data for c in row).rstrip()) * CHARACTER:.1f}">{text}</text>')
+    out.append("</g></svg></svg>")
+    return "\n".join(out) + "\n"
 
 
 def main():
@@ -99,12 +118,11 @@ def main():
         sys.exit(__doc__)
     target, size, command = sys.argv[1:]
     columns, lines = map(int, size.split("x"))
-    font = ImageFont.truetype(FONT, SIZE)
-    frames = held(record(command, columns, lines))
-    images = [painted(shown, font) for shown, _ in frames]
-    stays = [round(stay * 1000) for _, stay in frames]
-    images[0].save(target, save_all=True, append_images=images[1:], duration=stays, loop=0, optimize=True)
-    print(f"{target}: {len(images)} frames, {sum(stays) / 1000:.1f} s, {os.path.getsize(target) / 1024:.0f} kB")
+    rows, times = record(command, columns)
+    text = drawn(command, rows, paced(times), columns, lines)
+    with open(target, "w", encoding="utf-8") as file:
+        file.write(text)
+    print(f"{target}: {len(rows)} lines, {paced(times)[-1]:.1f} s, {len(text) / 1024:.0f} kB")
 
 
 main()

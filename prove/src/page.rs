@@ -8,7 +8,11 @@ use crate::{Answer, Claim, Verdict};
 /// Details of a claim that the terminal shows; the page has all.
 const SHOWN: usize = 5;
 
-/// The answer in a few lines: how many, and what is not proved.
+/// What stands beside every count of claims: a count alone would pass for all that there is.
+const BEYOND: &str = "No claim is about the sums of the network's layers, which `policyc verify` compares, or about compilers and \
+                      processors, which the kit checks.";
+
+/// The answer in a few lines: how many, what is not proved, and what no claim is about.
 #[must_use]
 pub fn summary(answer: &Answer) -> String {
     let mut lines = vec![sentence(answer)];
@@ -20,6 +24,7 @@ pub fn summary(answer: &Answer) -> String {
         let left = claim.details.len().saturating_sub(SHOWN);
         lines.extend((left > 0).then(|| format!("    and {left} more, in proof.json")));
     }
+    lines.push(BEYOND.to_owned());
     lines.join("\n")
 }
 
@@ -153,5 +158,6 @@ fn meaning() -> Section {
     Section::new("How to read it")
         .text("A claim is proved for every input that it names, not for a sample of them. Claims of one table share the runs that decided them, and their time.")
         .text("The C analysed is the portable text. Where a compiler gets masks, Eva gets branches. Claims that begin with `C:` and with `Eva:` say that both do what the contract says.")
+        .text(BEYOND)
         .text("Trusted are the provers, the preprocessor, and that the compiler of the firmware computes binary32 and binary64 as IEEE 754 says.")
 }

@@ -28,6 +28,7 @@ pub fn run(options: &Replay) -> Result<Outcome, Failure> {
         let message = Message::new("the log has nothing to compare with").found(log.columns());
         return Err(message
             .expected("columns `obs_0`, `obs_1`, ... in the network's order, or `action`, beside the signals")
+            .hint("columns of other names: --map obs_0=NAME,obs_1=NAME,action=NAME")
             .into());
     }
     let replay = replay::replay(

@@ -47,12 +47,9 @@ impl Played {
 
 /// A number without the remains of its binary form.
 fn told(number: f64) -> String {
-    let rounded = format!("{number:.*e}", DIGITS - 1).parse().unwrap_or(number);
-    // an exponent is read by all readers of records, and by not every lookup table of a bench: digits alone
-    format!("{rounded:.15}")
-        .trim_end_matches('0')
-        .trim_end_matches('.')
-        .to_owned()
+    let rounded: f64 = format!("{number:.*e}", DIGITS - 1).parse().unwrap_or(number);
+    // an exponent is read by all readers of records, and by not every lookup table of a bench: Rust writes digits alone
+    rounded.to_string()
 }
 
 /// Names and texts of the files of `list`, below [`FOLDER`]; none without experiments.

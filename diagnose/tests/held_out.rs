@@ -103,7 +103,8 @@ fn a_page_of_a_model_that_has_no_finite_value_says_so_and_draws_the_rest() {
         found.given.residual = spoiled;
         let page = diagnose::page::page(&found).unwrap();
         assert!(page.contains(words), "{words}");
-        assert_eq!(page.matches("<svg").count(), pictures, "{words}");
+        // none is lost; a channel in which more than noise is left gets more
+        assert!(page.matches("<svg").count() >= pictures, "{words}");
     }
     // neither model: a picture with no line at all gives way to its reason, and the page stays
     if let Some(best) = &mut found.attribution.best {

@@ -174,7 +174,7 @@ fn an_interrupted_campaign_goes_on_to_the_same_bytes() {
     );
     let mut command = desk.command();
     command.args(["campaign", "plan.toml", "--out", "out", "--jobs", "1"]);
-    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let begun = Instant::now();
     let checkpoint = || {
         let tasks = std::fs::read_dir(desk.path("out/work")).into_iter().flatten().flatten();
@@ -187,7 +187,7 @@ fn an_interrupted_campaign_goes_on_to_the_same_bytes() {
     }
     let ended = super::interrupt(child);
     assert_eq!(ended.status.code(), Some(130));
-    assert!(String::from_utf8_lossy(&ended.stdout).contains("4 tasks are left"));
+    assert!(String::from_utf8_lossy(&ended.stderr).contains("4 tasks are left"));
     assert!(!desk.path("out/results.json").exists() && checkpoint());
     desk.succeed("campaign plan.toml --out out");
     desk.succeed("campaign plan.toml --out whole");
@@ -214,9 +214,10 @@ fn a_task_that_fails_costs_no_other_and_is_tried_again() {
         "{}",
         ran.stdout
     );
+    let reasons = desk.read("out/results.json");
     assert!(
-        desk.read("out/results.json").contains("in/plants/fold.toml"),
-        "the reason has its place, without the machine's folders"
+        reasons.contains("in/plants/fold.toml"),
+        "the reason has its place, without the machine's folders: {reasons}"
     );
     assert!(
         !desk

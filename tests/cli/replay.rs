@@ -209,7 +209,12 @@ fn replay_refuses_a_log_that_it_cannot_compare() {
     desk.write("log.csv", "v_out,i_l,i_out\n100,2,2\n");
     desk.refuse(
         "replay buck12 log.csv",
-        &["nothing to compare with", "v_out, i_l, i_out", "obs_0", "--map obs_0=NAME"],
+        &[
+            "nothing to compare with",
+            "v_out, i_l, i_out",
+            "obs_0",
+            "--map obs_0=NAME",
+        ],
     );
     desk.write("log.csv", "v_out,i_l,obs_0\n100,2,0\n");
     desk.refuse("replay buck12 log.csv", &["no column for the signal `i_out`"]);

@@ -247,7 +247,8 @@ pub(super) fn section(list: &[Compared], residuals: &[Driven]) -> Section {
         (false, false) => "The model as given; there is no second one.",
     };
     let section = Section::new("How well the model fits").text(words).table(table).text(format!(
-        "Fit is 100 % less the error over what the channel moves. Chi²/N is 1 where only noise is left. White is an error that resembles \
+        "Fit is 100 % less the error over what the channel moves. Chi²/N is 1 where only noise is left; below 1 the noise, which is \
+         read off neighbouring rows, is estimated high, as it is where a record rings. White is an error that resembles \
          itself no more than noise does in {:.0} of 100 records.",
         100.0 * (1.0 - COLOURED)
     ));

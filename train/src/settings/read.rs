@@ -24,11 +24,17 @@ pub(super) fn settings(document: &Document) -> Result<Settings, Faults> {
 }
 
 fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<Settings> {
-    let path = &document.source().name.path;
+    let name = &document.source().name;
+    let path = &name.path;
     let folder = path.parent().unwrap_or(Path::new(""));
+    // by the way that is shown, where it is one that can be opened: `plants/buck.toml`, and not `train/../plants/buck.toml`
+    let beside = |text: &str| match name.path == name.shown {
+        true => name.beside(text).shown,
+        false => folder.join(text),
+    };
     let mut file = |key, hint, faults: &mut Sink| {
         let value = root.required(key, hint, faults)?;
-        value.text(faults).map(|text| folder.join(text))
+        value.text(faults).map(|text| beside(&text))
     };
     let hint = "the converter: `plant = \"../plants/paper-model.toml\"`";
     let plant = file("plant", hint, faults);

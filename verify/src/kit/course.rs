@@ -407,6 +407,8 @@ fn append(policy: &Policy, layout: &Layout, chunk: &Chunk, seen: Seen, trace: &m
                 }
             }
             Event::SetMapping { r, .. } => {
+                // the index of the output: a kit has the one
+                take(&mut input, 1);
                 let coefficients = take(&mut input, 4 * number);
                 // four numbers travel in any case; the kit calls a function of three
                 let given = if r.is_some() {

@@ -22,7 +22,7 @@ use measured::ColumnMap;
 use plant::{Faults, Parameters, Topology};
 use toml_input::{FileName, Message};
 
-use super::progress_line::{Pace, ProgressLine};
+use super::progress_line::{Pace, ProgressLine, Working};
 use super::simulate;
 use crate::arguments::Diagnose;
 use crate::failure::Failure;
@@ -195,8 +195,9 @@ fn found(options: &Diagnose, columns: &ColumnMap, say: &(dyn Fn(Progress<'_>) + 
         .map(|policy| request(options, policy, &model))
         .transpose()?
         .flatten();
-    say(Progress::Stage("reading the records"));
+    let reading = Working::new("reading the records");
     let (train, heldout) = records(options, columns, &model)?;
+    drop(reading);
     let mut diagnosis = diagnose(&model, train, &heldout, say);
     diagnosis.keep_text(&FileName::from(&options.model));
     if let Some(request) = closed_loop {

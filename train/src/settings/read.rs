@@ -34,7 +34,7 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<S
     };
     let mut file = |key, hint, faults: &mut Sink| {
         let value = root.required(key, hint, faults)?;
-        value.text(faults).map(|text| beside(&text))
+        value.text(faults).map(&beside)
     };
     let hint = "the converter: `plant = \"../plants/paper-model.toml\"`";
     let plant = file("plant", hint, faults);

@@ -225,9 +225,22 @@ mod tests {
         )
     }
 
+    /// The quantities of a fixture are those of the text.
+    fn holds(name: &str, map: &str, quantities: &[&str]) {
+        let text = fixture("record.csv");
+        let sheet = fixture(name);
+        assert_eq!(sheet.rows(), text.rows(), "{name}");
+        for quantity in quantities {
+            let (found, expected) = (numbers(&sheet, quantity, map), numbers(&text, quantity, ""));
+            let (found, expected) = (found.unwrap_or_else(|| panic!("{name}: {quantity}")), expected.unwrap());
+            // single precision in one of them, millivolts in another
+            let is_close = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * b.abs();
+            assert!(found.iter().zip(&expected).all(is_close), "{name}: {quantity}");
+        }
+    }
+
     #[test]
     fn every_layout_holds_the_record_of_the_text() {
-        let text = fixture("record.csv");
         let inductor = "i_l=scope_1,r_load=scope_2";
         for (name, map, quantities) in [
             ("vectors.mat", "", &["t", "duty", "v_out", "i_l", "r_load"][..]),
@@ -235,22 +248,13 @@ mod tests {
             ("controldesk.mat", "", &["t", "duty", "v_out", "i_l"]),
             ("structure_with_time.mat", "", &["t", "duty", "v_out"]),
         ] {
-            let sheet = fixture(name);
-            assert_eq!(sheet.rows(), text.rows(), "{name}");
-            for quantity in quantities {
-                let (found, expected) = (numbers(&sheet, quantity, map), numbers(&text, quantity, ""));
-                let (found, expected) = (found.unwrap_or_else(|| panic!("{name}: {quantity}")), expected.unwrap());
-                // single precision in one of them, millivolts in another
-                let is_close = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * b.abs();
-                assert!(found.iter().zip(&expected).all(is_close), "{name}: {quantity}");
-            }
+            holds(name, map, quantities);
         }
     }
 
     /// The same tables by another library, with MATLAB's header, classes and transposed arrays (fixtures/records/mat73.py).
     #[test]
     fn files_of_version_7_3_hold_the_record_of_the_text() {
-        let text = fixture("record.csv");
         let inductor = "i_l=scope_1,r_load=scope_2";
         for (name, map, quantities) in [
             ("vectors_73.mat", "", &["t", "duty", "v_out", "i_l", "r_load"][..]),
@@ -258,15 +262,7 @@ mod tests {
             ("controldesk_73.mat", "", &["t", "duty", "v_out", "i_l"]),
             ("cells_73.mat", "v_out=runs_1,duty=runs_2", &["t", "duty", "v_out"]),
         ] {
-            let sheet = fixture(name);
-            assert_eq!(sheet.rows(), text.rows(), "{name}");
-            for quantity in quantities {
-                let (found, expected) = (numbers(&sheet, quantity, map), numbers(&text, quantity, ""));
-                let (found, expected) = (found.unwrap_or_else(|| panic!("{name}: {quantity}")), expected.unwrap());
-                // single precision in one of them, millivolts in another
-                let is_close = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * b.abs();
-                assert!(found.iter().zip(&expected).all(is_close), "{name}: {quantity}");
-            }
+            holds(name, map, quantities);
         }
         // text, single numbers, squares, complex and empty matrices are no channels, in a file of either version
         let mut headers: Vec<String> = fixture("vectors_73.mat").headers().map(str::to_owned).collect();

@@ -106,22 +106,13 @@ pub fn choice(program: &Program) -> Choice {
         about_apart: " The greedy action for a measurement, with a stack of its own.",
         kind: quote!((u32, #kind)),
         name: quote!((action_index, chosen)),
-        body: quote! {
-            let mut best = #lowest;
-            let mut chosen = DUTIES[0];
-            let mut action_index = 0_u32;
-            let mut action = 0_u32;
-            // the lowest index wins among equals, a NaN never does
-            for (q, duty) in network(observation).iter().zip(&DUTIES) {
-                let above = flag(*q > best);
-                let mask = 0_u32.wrapping_sub(above);
-                best = #greater(above, *q, best);
-                chosen = select(above, *duty, chosen);
-                action_index = (action & mask) | (action_index & !mask);
-                action = action.wrapping_add(1);
-            }
-            (action_index, chosen)
-        },
+        body: argmax(
+            &lowest,
+            &greater,
+            &quote!(network(observation)),
+            &quote!(DUTIES),
+            &quote!(&DUTIES),
+        ),
         chosen: Vec::new(),
         indices: vec![quote!(action_index & 0_u32.wrapping_sub(trusted))],
     }
@@ -191,5 +182,31 @@ fn fma() -> TokenStream {
             let towards = 1_u64.wrapping_sub(((error.to_bits() ^ sum.to_bits()) >> 63) << 1);
             f64::from_bits(sum.to_bits().wrapping_add(odd.wrapping_mul(towards))) as f32
         }
+    }
+}
+
+/// Index and duty of the greatest of `outputs`; `duties` is the table, `lent` the same as an iterator takes it.
+pub(super) fn argmax(
+    lowest: &TokenStream,
+    greater: &TokenStream,
+    outputs: &TokenStream,
+    duties: &TokenStream,
+    lent: &TokenStream,
+) -> TokenStream {
+    quote! {
+        let mut best = #lowest;
+        let mut chosen = #duties[0];
+        let mut action_index = 0_u32;
+        let mut action = 0_u32;
+        // the lowest index wins among equals, a NaN never does
+        for (q, duty) in #outputs.iter().zip(#lent) {
+            let above = flag(*q > best);
+            let mask = 0_u32.wrapping_sub(above);
+            best = #greater(above, *q, best);
+            chosen = select(above, *duty, chosen);
+            action_index = (action & mask) | (action_index & !mask);
+            action = action.wrapping_add(1);
+        }
+        (action_index, chosen)
     }
 }

@@ -31,25 +31,19 @@ pub fn items(program: &Program) -> TokenStream {
         let duties = tables::values(program, &HeadPart::table(index));
         quote! { static #name: [#kind; #length] = #duties; }
     });
+    let argmax = super::network::argmax(
+        &quote!(#kind::MIN),
+        &quote!(select),
+        &quote!(outputs),
+        &quote!(duties),
+        &quote!(duties),
+    );
     quote! {
         #(#statics)*
         /// Index and duty of the greedy action among some outputs.
         #[inline(always)]
         fn greedy<const N: usize>(outputs: [#kind; N], duties: &[#kind; N]) -> (u32, #kind) {
-            let mut best = #kind::MIN;
-            let mut chosen = duties[0];
-            let mut action_index = 0_u32;
-            let mut action = 0_u32;
-            // the lowest index wins among equals, a NaN never does
-            for (q, duty) in outputs.iter().zip(duties) {
-                let above = flag(*q > best);
-                let mask = 0_u32.wrapping_sub(above);
-                best = select(above, *q, best);
-                chosen = select(above, *duty, chosen);
-                action_index = (action & mask) | (action_index & !mask);
-                action = action.wrapping_add(1);
-            }
-            (action_index, chosen)
+            #argmax
         }
     }
 }

@@ -35,12 +35,12 @@ pub use program::Program;
 use targets::TargetSpec;
 use toml_input::{Message, messages};
 
-/// The deployment target of that name.
+/// The deployment target of that name, or the one that has the core of a part by its number, `stm32g474`.
 ///
 /// # Errors
-/// If there is none: the names that there are, and the core of a part whose name it is.
+/// If there is none: the names that there are, and the core of a compiler's triple whose name it is.
 pub fn target(name: &str) -> Result<&'static TargetSpec, Message> {
-    targets::find(name).ok_or_else(|| {
+    targets::find_or_part(name).ok_or_else(|| {
         let core = targets::of_part(name).map(|core| format!("its core is that of `{core}`"));
         messages::unknown("target", name, &targets::names()).maybe_hint(core)
     })

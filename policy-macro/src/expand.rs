@@ -77,7 +77,7 @@ fn target(input: ParseStream<'_>) -> syn::Result<&'static TargetSpec> {
         .map_err(|error| syn::Error::new(error.span(), END))?;
     let name: LitStr = input.parse().map_err(|error| syn::Error::new(error.span(), END))?;
     input.parse::<Option<Token![,]>>()?;
-    targets::find(&name.value()).ok_or_else(|| {
+    targets::find_or_part(&name.value()).ok_or_else(|| {
         let hint = targets::of_part(&name.value()).map_or_else(String::new, |core| format!("; did you mean `{core}`?"));
         let names = targets::names().join(", ");
         syn::Error::new(name.span(), format!("no such target: expected one of {names}{hint}"))

@@ -184,15 +184,20 @@ pub(crate) fn adc_shows_nothing(name: &str, shown: Interval) -> Message {
         .hint("a converter whose codes fall while the value rises has an offset at the other end: physical = gain * code + offset")
 }
 
-/// What ends a range at or beyond the end of its converter: `end` is the value at the last or the first code.
-pub(crate) fn adc_saturates(name: &str, end: f64, range: Interval) -> Message {
+/// What ends a range at or beyond the end of its converter: `end` is the value at the last or the first code, `step`
+/// that of a code.
+pub(crate) fn adc_saturates(name: &str, end: f64, step: f64, range: Interval) -> Message {
     // a range is stated with some room; one that is half as wide again as what the converter shows is that of another divider
     let reached = if end > 0.0 { range.high / end } else { range.low / end };
     let hint = if reached > 1.5 {
         "this converter ends far inside of the range: is `gain`, with the divider or the shunt before it, that of the board? If it is, the \
          policy needs values that nobody measures; only if it does not, end the range before the codes do"
+            .to_owned()
     } else {
-        "else a converter that is stuck at its end passes for a measurement"
+        let last = tidy(end - step.copysign(end));
+        format!(
+            "let the range end at {last}, a code before: a converter that is stuck at its end would else pass for a measurement"
+        )
     };
     Message::new(format!(
         "an ADC at the end of its codes is a plausible value of `{name}`"

@@ -1,4 +1,6 @@
-//! Microcontrollers by the names that are printed on them, for a hint; the core of each is in its maker's data sheet.
+//! Microcontrollers by the names that are printed on them, for `--target`; the core of each is in its maker's data sheet.
+
+use crate::TargetSpec;
 
 /// Beginning of a part's name, in lower case, and the target of its core.
 const FAMILIES: &[(&str, &str)] = &[
@@ -68,10 +70,23 @@ pub fn parts() -> String {
 
 /// Beginnings of the names of a target's parts.
 pub(crate) fn of_target(target: &str) -> Vec<&'static str> {
-    // triples and cores are no parts
-    let is_part = |name: &&str| !name.starts_with("thumb") && !name.starts_with("cortex");
+    let is_part = |name: &&str| !is_core(name);
     let names = FAMILIES.iter().filter(|(_, own)| *own == target).map(|(name, _)| *name);
     names.filter(is_part).collect()
+}
+
+/// The target of that name, or the one that has the core of that part.
+///
+/// A core or a compiler's triple that is nearly one is no part: what stands behind it is a slip, not a package.
+#[must_use]
+pub fn find_or_part(name: &str) -> Option<&'static TargetSpec> {
+    let of_part = || of_part(name).filter(|_| !is_core(&name.to_ascii_lowercase()));
+    crate::find(name).or_else(|| of_part().and_then(crate::find))
+}
+
+/// Whether the name begins as that of a core or of a compiler's triple.
+fn is_core(name: &str) -> bool {
+    name.starts_with("thumb") || name.starts_with("cortex")
 }
 
 /// The target of a part or a compiler's triple, if `name` begins as one that is known.
@@ -95,5 +110,11 @@ mod tests {
         }
         assert_eq!(of_part("STM32G474RE"), Some("cortex-m4f"));
         assert_eq!(of_part("pdp-11"), None);
+        let target = |name| find_or_part(name).map(|target| target.name);
+        assert_eq!(target("STM32G474RE"), Some("cortex-m4f"));
+        assert_eq!(target("cortex-m3"), Some("cortex-m3"));
+        for slip in ["cortex-m00", "thumbv6m-none", "cortex-m5", "pdp-11"] {
+            assert_eq!(target(slip), None, "{slip}");
+        }
     }
 }

@@ -12,7 +12,7 @@ mod riscv;
 mod spec;
 
 pub use boards::{Board, BoardFile};
-pub use families::{of_part, parts};
+pub use families::{find_or_part, of_part, parts};
 pub use overview::{details, overview};
 pub use spec::{
     CCompiler, CycleModel, Endianness, Fma, Fpu, IntegerBlock, IntegerLoop, RowBlock, Runner, RustTarget, Sections,

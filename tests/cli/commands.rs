@@ -124,6 +124,13 @@ fn one_target_is_shown_by_its_name_or_by_a_part_of_it() {
     }
     assert!(!text.contains("riscv"), "{text}");
     assert_eq!(desk.succeed("targets STM32G474RE"), text);
+    let compiled = desk.type_in("compile policy --target STM32G474RE --no-costs --out out");
+    assert_eq!(compiled.code, Some(0), "{}", compiled.stderr);
+    assert!(
+        compiled.stderr.contains("STM32G474RE has the core `cortex-m4f`"),
+        "{}",
+        compiled.stderr
+    );
     assert!(desk.succeed("targets c2000-c28x").contains("taken for zero"));
     let json: serde_json::Value = serde_json::from_str(&desk.succeed("targets cortex-m3 --json")).unwrap();
     assert_eq!(json["name"], "cortex-m3");

@@ -50,7 +50,7 @@ fn a_name_that_is_nearly_one_is_answered_with_it() {
         ("verify policy --format I16", "did you mean `i16`?"),
         ("certify policy --out out --axis v_ou", "did you mean `v_out`?"),
         (
-            "compile policy --out out --target STM32G474RE",
+            "compile policy --out out --target thumbv7em-none-eabihf",
             "its core is that of `cortex-m4f`",
         ),
     ] {

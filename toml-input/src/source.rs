@@ -26,7 +26,10 @@ impl Origin {
         match self {
             Origin::Caller => "the path is relative to the working folder",
             Origin::Crate => "the path is relative to the folder of Cargo.toml",
-            Origin::File => "paths are relative to the folder of the file that names them",
+            Origin::File => {
+                "paths are relative to the folder of the file that names them; where they belong to it, whoever gave you that file has the others \
+                 too"
+            }
         }
     }
 }

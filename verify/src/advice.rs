@@ -47,7 +47,7 @@ pub fn lines(
     }
     // of the build that is done first: who is in a hurry takes that one
     let soonest = budgets.iter().min_by(|a, b| a.1.share.1.total_cmp(&b.1.share.1));
-    lines.extend(soonest.and_then(|(_, budget)| budget.lateness()));
+    lines.extend(soonest.and_then(|(_, budget)| budget.lateness(&policy.observers)));
     if budgets.iter().any(|(_, budget)| budget.fit == Fit::Met) {
         return Ok(lines);
     }
@@ -122,7 +122,8 @@ fn too_slow(
             format.name()
         )),
         Widest::None => lines.push(format!(
-            "  = hint: in {} with {build} not even four neurons in each hidden layer surely fit",
+            "  = hint: in {} with {build} not even four neurons in each hidden layer surely fit: a faster clock, a longer period or another \
+             processor is needed",
             format.name()
         )),
         Widest::Unknown => {}

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use policy::Observer;
 use report::grouped;
 use serde::Serialize;
 
@@ -66,6 +67,10 @@ impl fmt::Display for Clock {
 /// Share of the period beyond which a step that is begun in its middle ends behind its end.
 const HALF: f64 = 0.5;
 
+/// Share of the period below which what is left is none: interrupt entry and exit, two conversions and a timer take some 100 cycles,
+/// 1 % of a period of 100 us at 100 MHz.
+const SCARCE: f64 = 0.01;
+
 /// Whether the model says that a step fits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -112,8 +117,20 @@ impl Budget {
 
     /// When the duty of a step acts, where that may be a period later than one thinks; `None` where it fits into half of the period.
     #[must_use]
-    pub fn lateness(&self) -> Option<String> {
+    pub fn lateness(&self, observers: &[Observer]) -> Option<String> {
         let most = self.share.1;
+        let counts_on_it = !observers.is_empty() && observers.iter().all(|observer| observer.compute_delay == 1);
+        if self.fit != Fit::Missed && most > HALF && counts_on_it {
+            return Some(format!(
+                "  note: a step takes up to {:.0} % of the period. The contract counts on a duty that acts one period later \
+                 (compute_delay = 1): let the timer take it over at the start of the next period, never earlier",
+                100.0 * most
+            ));
+        }
+        let and_there = match observers {
+            [] => "",
+            _ => ", and compute_delay = 1 in the contract",
+        };
         (self.fit != Fit::Missed && most > HALF).then(|| {
             let sampled = match most < 1.0 {
                 true => format!("Sampled later than {:.0} % into the PWM period,", 100.0 * (1.0 - most)),
@@ -121,7 +138,7 @@ impl Budget {
             };
             format!(
                 "  note: a step takes up to {:.0} % of the period. {sampled} its duty can miss the next start and act one period later: \
-                 train with pwm.duty_delay = 1 in the plant file then",
+                 train with pwm.duty_delay = 1 in the plant file then{and_there}",
                 100.0 * most
             )
         })
@@ -134,6 +151,9 @@ impl Budget {
         let period = grouped(self.period_cycles as u64);
         let clock = Clock { hz: self.clock_hz };
         let verdict = match self.fit {
+            Fit::Met if 1.0 - self.share.1 < SCARCE => {
+                "met, with nothing left for interrupt entry and drivers at the worst".to_owned()
+            }
             Fit::Met => format!(
                 "met; {:.0} % of the period is left for everything else at the worst",
                 100.0 - most
@@ -201,7 +221,7 @@ mod tests {
         let lateness = |cycles| {
             Budget::of(&costs(Some(cycles)), Clock { hz: 1e8 }, 1e-4)
                 .unwrap()
-                .lateness()
+                .lateness(&[])
         };
         assert_eq!(lateness((2_000, 4_900)), None);
         assert!(
@@ -216,5 +236,13 @@ mod tests {
         );
         // what does not fit at all is another matter
         assert_eq!(lateness((10_001, 20_000)), None);
+        // what leaves less than interrupt entry takes leaves nothing
+        let text = |cycles| {
+            Budget::of(&costs(Some(cycles)), Clock { hz: 1e8 }, 1e-4)
+                .unwrap()
+                .text("gcc")
+        };
+        assert!(text((5_000, 9_950)).contains("nothing left"));
+        assert!(text((5_000, 9_800)).contains("2 % of the period is left"));
     }
 }

@@ -85,6 +85,9 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     )?;
     drop(working);
     ownership::check_policy(&options.out, &policy.name, options.replacing)?;
+    if targets::find(&options.target).is_none() {
+        talk::note(&format!("{} has the core `{}`", options.target, made.target.name));
+    }
     let written = write(&options.out, &made.files, &made.archives, options.replacing)?;
     let costs = made.costs.texts(&policy, made.target, options.clock);
     let budget = match options.clock {

@@ -151,5 +151,5 @@ fn saturation(range: Interval, ends: [f64; 2], gain: f64, name: &str) -> Option<
     [last, first]
         .into_iter()
         .find(|end| within(*end) && *end != 0.0)
-        .map(|end| catalogue::adc_saturates(name, end, range))
+        .map(|end| catalogue::adc_saturates(name, end, gain.abs(), range))
 }

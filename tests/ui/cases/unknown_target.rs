@@ -1,1 +1,1 @@
-policy_macro::include_policy!("policy/policy.toml", target = "STM32G474");
+policy_macro::include_policy!("policy/policy.toml", target = "thumbv7em-none-eabihf");

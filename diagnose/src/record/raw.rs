@@ -283,23 +283,53 @@ impl<'a> Raw<'a> {
     }
 }
 
-/// What no record can do without; the first fault proposes a map of the columns that look like it.
 /// A load current that is called as a set one, alone, and whose rows are those of a meter: it is the measured one.
 fn take_for_a_meter(sheet: &Sheet, located: &mut Located) -> Option<String> {
     let signal = located.signal("i_load")?;
     signal.column()?;
     let label = signal.label.clone();
     let readings: Vec<f64> = (0..sheet.rows()).filter_map(|row| signal.number(sheet, row)).collect();
-    if located.signal("i_out").is_some() || !is_metered(&readings) {
+    if located.signal("i_out").is_some() {
         return None;
     }
+    let reason = if is_metered(&readings) {
+        "changes in nearly every row, back and forth, as the readings of a meter do"
+    } else if is_current_of_resistor(sheet, located) {
+        "is v_out over r_load in nearly every row, the current of that resistor and no second load"
+    } else {
+        return None;
+    };
     located.take_as("i_load", "i_out");
     Some(format!(
-        "{label} changes in nearly every row, back and forth, as the readings of a meter do: it is taken for i_out, the measured load \
-         current, and not for a load that was set"
+        "{label} {reason}: it is taken for i_out, the measured load current, and not for a load that was set"
     ))
 }
 
+/// A load that was set beside a resistor is `v_out / r_load` in few rows by chance: the voltage moves and the setting does not.
+const ROWS_OF_RESISTOR: f64 = 0.8;
+/// Gains of two meters and a resistor at its temperature are off by some percent together.
+const RESISTOR_TOLERANCE: f64 = 0.05;
+/// As for the jitter of a meter: fewer rows may be a table of settings.
+const FEWEST_ROWS: usize = 40;
+
+/// Whether `i_load` is what the resistor `r_load` takes at `v_out`.
+fn is_current_of_resistor(sheet: &Sheet, located: &Located) -> bool {
+    let [Some(v), Some(i), Some(r)] = ["v_out", "i_load", "r_load"].map(|name| located.signal(name)) else {
+        return false;
+    };
+    let rows =
+        (0..sheet.rows()).filter_map(|row| Some([v.number(sheet, row)?, i.number(sheet, row)?, r.number(sheet, row)?]));
+    let rows: Vec<[f64; 3]> = rows.filter(|[.., r]| *r > 0.0).collect();
+    let alike = rows
+        .iter()
+        .filter(|[v, i, r]| (i - v / r).abs() < RESISTOR_TOLERANCE * (v / r).abs());
+    let moves = rows.windows(2).filter(|pair| pair[0][1] != pair[1][1]).count();
+    // a current that stays while the voltage moves was set, whatever its size
+    let is_read = 2 * moves > rows.len();
+    rows.len() >= FEWEST_ROWS && is_read && alike.count() as f64 >= ROWS_OF_RESISTOR * rows.len() as f64
+}
+
+/// What no record can do without; the first fault proposes a map of the columns that look like it.
 fn incomplete(sheet: &Sheet, located: &Located, may_be_capture: bool) -> Sink {
     let has = |name: &str| located.signal(name).is_some();
     let mut list = Vec::new();

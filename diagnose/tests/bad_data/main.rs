@@ -192,6 +192,26 @@ fn a_load_current_with_the_jitter_of_a_meter_is_measured_whatever_its_column_is_
 }
 
 #[test]
+fn the_current_of_the_resistor_is_no_second_load() {
+    let taken = |current: fn(f64) -> f64| {
+        let row = |n: usize| {
+            // a slow swing, whose current no jitter of a meter shows
+            let v = 12.0 + (n as f64 / 9.0).sin();
+            format!("{},0.25,{v:.4},2.4,{:.4}\n", n as f64 * 1e-4, current(v))
+        };
+        let rows: String = (0..120).map(row).collect();
+        let record = read(format!("t,duty,v_out,r_load,i_load\n{rows}").as_bytes()).unwrap();
+        record.repairs.iter().any(|text| text.contains("no second load"))
+    };
+    assert!(taken(|v| v / 2.4 * 1.02));
+    assert!(!taken(|_| 5.0), "a load that was set beside the resistor");
+    assert!(
+        !taken(|v| 2.0 - 0.1 * (v - 12.0)),
+        "another load, which draws less as the voltage rises"
+    );
+}
+
+#[test]
 fn columns_with_names_of_their_own_get_a_whole_map_proposed_and_never_applied() {
     let other = header(HEADER, "time_s,D,Vout,IL,Spannung,Iout");
     let faults = read(other.as_bytes()).unwrap_err().to_string();

@@ -236,7 +236,9 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
             duty,
             load,
         });
-        if self.pre.len() < watched.max(1) {
+        if change.is_some() {
+            // the sample at its end shows the new load already: an ESR makes a step of it at once
+        } else if self.pre.len() < watched.max(1) {
             self.pre.push(error.abs());
         } else {
             let oldest = self.elapsed % self.pre.len();

@@ -102,3 +102,28 @@ fn a_controller_is_told_at_the_step_and_errors_are_those_from_the_new_reference(
     assert!((metrics.deviation - 2.17).abs() < 0.1, "{metrics:?}");
     assert!(metrics.settling > 1e-3 && metrics.settling < 50e-3, "{metrics:?}");
 }
+
+/// The step of a load leaps over a capacitor's series resistance within no time. The sample at that instant shows it, and is none before the step.
+#[test]
+fn the_sample_at_which_the_load_steps_is_not_before_it() {
+    let mut plant = Parameters::paper_model();
+    plant.capacitor.esr = 0.05;
+    let environment = Converter::new(&plant).unwrap();
+    let mut share = Share {
+        told: Vec::new(),
+        steps: 0,
+        v_ref: 0.0,
+    };
+    let step = read("resistance_steps = [[50, 10]]\n").unwrap()[0];
+    // until the start has died away
+    let task = Task {
+        lead: 4000,
+        ..Task::default()
+    };
+    for phase in [0.0, 0.4] {
+        let instant = Instant { periods: 0, phase };
+        let trajectory = follow(&environment, &mut share, 100.0, &task, step, instant).unwrap();
+        // 8 A over 50 mohm are .4 V
+        assert!(trajectory.metrics.pre_error < 0.1, "{phase}: {:?}", trajectory.metrics);
+    }
+}

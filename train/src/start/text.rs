@@ -15,6 +15,8 @@ pub const SCENARIO: &str = "scenario.toml";
 // The scales are those of examples/train/measured, whose features, bands and dead zone were tuned on the converter of the paper,
 // as shares of its smallest deviation of 1.6 V and its load step of 8 A.
 
+/// Multiplications of a step: the features of the contract, the hidden layers of the training file, the offsets.
+pub const MULTIPLICATIONS: usize = 5 * 64 + 64 * 64 + 64 * 13;
 /// Control periods behind a load step, as a scenario has by default.
 const USUAL_AFTER: usize = 300;
 /// Of that converter, V and A.

@@ -122,6 +122,7 @@ impl Statement {
     }
 
     /// `of left` of the output `left`, behind a space; nothing where there is one output.
+    #[cfg(feature = "page")]
     pub(crate) fn of(&self) -> String {
         let name = self.output.as_ref();
         name.map_or(String::new(), |name| format!(" of {name}"))

@@ -68,12 +68,18 @@ fallback = { duty = 0.25 }
 hold = 0
 "#;
 
-#[test]
-fn each_of_several_outputs_has_a_statement_with_its_name() {
+/// The case with two outputs in the place of its one.
+pub(super) fn two_outputs() -> Desk {
     let desk = Desk::new("minimal");
     let contract = desk.read("policy/policy.toml");
     let (before, _) = contract.split_once("[actions]").unwrap();
     desk.write("policy/policy.toml", &format!("{before}{OUTPUTS}"));
+    desk
+}
+
+#[test]
+fn each_of_several_outputs_has_a_statement_with_its_name() {
+    let desk = two_outputs();
     let said = desk.succeed("certify policy --format i16 --samples 50 --boxes 20 --out out");
     assert!(said.contains("minimal, output left in i16: |Q - real Q|"), "{said}");
     assert!(

@@ -100,7 +100,8 @@ pub fn make(policy: &Policy, options: &Request) -> Result<Made, Failure> {
         return Err(message.hint("--format f32").into());
     }
     let decides = policy.paths().iter().any(|path| path.head.is_choice());
-    if !decides && !(options.axis.is_empty() && options.at.is_empty()) {
+    let asks_for_a_map = !(options.axis.is_empty() && options.at.is_empty());
+    if asks_for_a_map && !decides {
         let message = Message::new("a map shows where actions are proven, and this policy commands a number");
         return Err(message.found("--axis or --at").hint("leave them out").into());
     }

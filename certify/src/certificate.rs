@@ -1,7 +1,7 @@
 //! Everything that is said about a policy in a numeric format.
 
 use policy::{Continuous, Digests, Interval, NumericFormat, Policy, Schedule};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::cover::{Map, Share, Slice, StateBound};
 use crate::measured::{Measured, QValues};
@@ -46,12 +46,23 @@ pub struct Certificate {
     pub numeric_format: NumericFormat,
     /// Digests of the policy.
     pub digests: Digests,
-    /// Proven for every observation of the clamped box, features independent of each other.
-    pub box_bound: Bound,
     /// Axes of the set of states.
     pub coordinates: Vec<Coordinate>,
     /// Features that say nothing new.
     pub copies: Vec<AffineCopy>,
+    /// What is said of each output; in JSON that of a contract with one stands beside the other entries.
+    #[serde(flatten, serialize_with = "said")]
+    pub statements: Vec<Statement>,
+}
+
+/// What is said of one output.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Statement {
+    /// Its name; `None` where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub output: Option<String>,
+    /// Proven for every observation of the clamped box, features independent of each other.
+    pub box_bound: Bound,
     /// Proven for every state.
     pub state_bound: StateBound,
     /// Where the command is a number: all bounds are of the duty then, and nothing is said of actions.
@@ -69,6 +80,18 @@ pub struct Certificate {
     pub golden: Option<Golden>,
     /// A slice of the states; `None` with fewer than two coordinates.
     pub map: Option<Map>,
+}
+
+/// One statement as it is, several as a list.
+fn said<S: Serializer>(statements: &[Statement], serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Several<'a> {
+        outputs: &'a [Statement],
+    }
+    match statements {
+        [one] => one.serialize(serializer),
+        outputs => Several { outputs }.serialize(serializer),
+    }
 }
 
 /// What holds at and around golden observations.
@@ -89,7 +112,7 @@ pub struct Neighbourhood {
     pub share: Share,
 }
 
-impl Certificate {
+impl Statement {
     /// Distance between the least and the largest duty, where all bounds are of the duty.
     #[must_use]
     pub fn duty_span(&self) -> Option<f64> {
@@ -98,7 +121,16 @@ impl Certificate {
         of_actor.or_else(|| self.schedule.as_ref().map(of_law))
     }
 
-    /// Bounds, shares and map of a policy; `uniform` draws from 0..1.
+    /// `of left` of the output `left`, behind a space; nothing where there is one output.
+    #[cfg(feature = "page")]
+    pub(crate) fn of(&self) -> String {
+        let name = self.output.as_ref();
+        name.map_or(String::new(), |name| format!(" of {name}"))
+    }
+}
+
+impl Certificate {
+    /// Bounds, shares and maps of a policy's outputs; `uniform` draws from 0..1.
     #[must_use]
     pub fn new(
         policy: &Policy,
@@ -108,50 +140,72 @@ impl Certificate {
         uniform: &mut dyn FnMut() -> f64,
     ) -> Self {
         let certifier = Certifier::new(policy);
-        let is_choice = policy.head.is_choice();
         let domain = Domain::of(policy, Memory::Free);
         // the same states for the share and for what is seen, so that the two can be held against each other
         let points: Vec<Vec<f64>> = (0..effort.samples).map(|_| domain.draw(uniform)).collect();
         let observations: Vec<Vec<f32>> = points.iter().map(|point| domain.observation(point)).collect();
+        let parts = &certifier.parts;
+        let map = |slice: &Slice| certifier.maps(&Domain::of(policy, slice.memory), slice, q_values);
+        let mut box_bounds = certifier.box_bounds().into_iter();
+        let mut state_bounds = certifier.state_bounds(&domain, effort.boxes).into_iter();
+        let mut shares = certifier.shares(&domain, &points, effort.depth).into_iter();
+        let mut measured = certifier
+            .measure(observations.iter().map(Vec::as_slice), q_values)
+            .into_iter();
+        let mut golden = golden(policy, &certifier, q_values).into_iter();
+        let mut maps = slice.map(map).unwrap_or_default().into_iter();
+        let statements = parts.iter().map_while(|part| {
+            Some(Statement {
+                output: part.name.clone(),
+                box_bound: box_bounds.next()?,
+                state_bound: state_bounds.next()?,
+                continuous: part.head.continuous().copied(),
+                schedule: part.head.schedule().cloned(),
+                proven_share: shares.next()?,
+                measured: measured.next()?,
+                golden: golden.next(),
+                map: maps.next().flatten(),
+            })
+        });
         Self {
             name: policy.name.clone(),
             numeric_format: policy.numeric_format,
             digests: policy.digests.clone(),
-            box_bound: certifier.box_bound(),
             coordinates: domain.coordinates().to_vec(),
             copies: domain.copies(),
-            state_bound: certifier.state_bound(&domain, effort.boxes),
-            continuous: policy.head.continuous().copied(),
-            schedule: policy.head.schedule().cloned(),
-            proven_share: is_choice.then(|| certifier.share(&domain, &points, effort.depth)),
-            measured: certifier.measure(observations.iter().map(Vec::as_slice), q_values),
-            golden: golden(policy, &certifier, q_values),
-            map: slice
-                .filter(|_| is_choice)
-                .map(|slice| certifier.map(&Domain::of(policy, slice.memory), slice, q_values)),
+            statements: statements.collect(),
         }
     }
 }
 
-fn golden(policy: &Policy, certifier: &Certifier, q_values: &QValues<'_>) -> Option<Golden> {
-    let golden = policy.golden.as_ref()?;
+/// One entry for each output; none without golden observations.
+fn golden(policy: &Policy, certifier: &Certifier, q_values: &QValues<'_>) -> Vec<Golden> {
+    let Some(golden) = &policy.golden else {
+        return Vec::new();
+    };
     let width = policy.features.len().max(1);
     let observations = || golden.observations.chunks_exact(width);
-    let neighbourhood = |radius: f64| Neighbourhood {
-        radius,
-        share: certifier.share_around(observations(), radius),
-    };
-    Some(Golden {
-        measured: certifier.measure(observations(), q_values),
-        neighbourhoods: match policy.head.is_choice() {
-            false => Vec::new(),
-            true => RADII.map(neighbourhood).to_vec(),
-        },
-    })
+    let mut all: Vec<Golden> = certifier
+        .measure(observations(), q_values)
+        .into_iter()
+        .map(|measured| Golden {
+            measured,
+            neighbourhoods: Vec::new(),
+        })
+        .collect();
+    if certifier.parts.iter().any(|part| part.head.is_choice()) {
+        for radius in RADII {
+            for (golden, share) in all.iter_mut().zip(certifier.shares_around(observations(), radius)) {
+                let near = share.map(|share| Neighbourhood { radius, share });
+                golden.neighbourhoods.extend(near);
+            }
+        }
+    }
+    all
 }
 
 impl Certifier {
-    /// The part of a slice in which the real network's action changes, with a margin; the slice itself if it does not.
+    /// The part of a slice in which an action of the real network changes, with a margin; the slice itself if it does not.
     #[must_use]
     pub fn zoomed(&self, domain: &Domain, slice: &Slice) -> Slice {
         let mut slice = slice.clone();
@@ -171,13 +225,13 @@ impl Certifier {
         const GRID: usize = 96;
         let at = |range: Interval, n: usize| range.low + (range.high - range.low) * (n as f64 / (GRID - 1) as f64);
         // the real network alone: no format may decide which region is looked at
-        let action = |column: usize, row: usize| {
+        let actions = |column: usize, row: usize| {
             let mut point = slice.at.clone();
             point[slice.x.0] = at(slice.x.1, column);
             point[slice.y.0] = at(slice.y.1, row);
-            self.real_action(&domain.observation(&point))
+            self.real_actions(&domain.observation(&point))
         };
-        let grid: Vec<usize> = (0..GRID * GRID).map(|n| action(n % GRID, n / GRID)).collect();
+        let grid: Vec<Vec<usize>> = (0..GRID * GRID).map(|n| actions(n % GRID, n / GRID)).collect();
         let mut ends: Option<[usize; 4]> = None;
         for n in 0..GRID * GRID {
             let (column, row) = (n % GRID, n / GRID);

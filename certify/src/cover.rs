@@ -1,13 +1,14 @@
 //! Sets of states by splitting boxes: the bound over all states, the share that is decided, the map of a slice.
 //!
 //! ```text
-//!  state_bound  split the worst box again and again       every state lies in a leaf: the largest bound holds
-//!  share        a random point walks down the halves      is it in a box with one proven action?
-//!  map          cells of a plane, split while undecided   paint what is proven, look at a point of the rest
+//!  state_bounds  split the worst box again and again       every state lies in a leaf: the largest bound holds
+//!  shares        a random point walks down the halves      is it in a box with one proven action?
+//!  maps          cells of a plane, split while undecided   paint what is proven, look at a point of the rest
 //! ```
 //!
 //! In: a certifier, a domain. Out: bounds and shares. The one invariant: where a box is cut depends on the box alone, never
-//! on the point that asks, so all points walk down one tree, and proven boxes are a set whose volume can be estimated.
+//! on the point that asks, so all points walk down one tree, and proven boxes are a set whose volume can be estimated. Several
+//! outputs share the boxes and each pass over the network.
 
 use std::collections::BinaryHeap;
 
@@ -83,14 +84,16 @@ const SPLITS: usize = 3;
 
 /// A box that waits for splitting, the worst first.
 struct Waiting {
-    bound: Bound,
+    /// How bad it is: the largest bound, of several outputs each in units of that over the whole domain.
+    worst: f64,
+    bounds: Vec<Bound>,
     cell: Cell,
 }
 
 impl Ord for Waiting {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
         // a heap needs an order of all numbers, and `partial_cmp` has none for one that is no number
-        self.bound.largest.total_cmp(&other.bound.largest)
+        self.worst.total_cmp(&other.worst)
     }
 }
 
@@ -109,14 +112,30 @@ impl PartialEq for Waiting {
 impl Eq for Waiting {}
 
 impl Certifier {
-    /// Bound over all states of a domain; the worst box is split until `boxes` were propagated.
+    /// Bound over all states of a domain for each output; the worst box is split until `boxes` were propagated.
     #[must_use]
-    pub fn state_bound(&self, domain: &Domain, boxes: usize) -> StateBound {
-        let wait = |cell: Cell| Waiting {
-            bound: self.bound_over(domain, &cell),
-            cell,
+    pub fn state_bounds(&self, domain: &Domain, boxes: usize) -> Vec<StateBound> {
+        let whole = self.bounds_over(domain, &domain.whole());
+        // Q values and duties have no unit in common: which box is worst is asked in shares of what is to be lowered
+        let units: Vec<f64> = match whole.as_slice() {
+            [_] => vec![1.0],
+            all => all.iter().map(|bound| bound.largest.max(f64::MIN_POSITIVE)).collect(),
         };
-        let mut waiting = BinaryHeap::from([wait(domain.whole())]);
+        let wait = |cell: Cell| {
+            let bounds = self.bounds_over(domain, &cell);
+            let shares = bounds.iter().zip(&units).map(|(bound, unit)| bound.largest / unit);
+            Waiting {
+                worst: shares.fold(0.0, f64::max),
+                bounds,
+                cell,
+            }
+        };
+        // alone in the heap: how bad it is does not matter
+        let mut waiting = BinaryHeap::from([Waiting {
+            worst: 0.0,
+            bounds: whole.clone(),
+            cell: domain.whole(),
+        }]);
         let mut count = 1;
         // the worst first: the bound of the whole is the largest of the leaves, so no other split can lower it
         while count + 2 <= boxes {
@@ -126,31 +145,33 @@ impl Certifier {
             waiting.push(wait(upper));
             count += 2;
         }
-        let mut per_action: Vec<f64> = Vec::new();
+        let mut all: Vec<Vec<f64>> = whole.iter().map(|bound| vec![0.0; bound.per_action.len()]).collect();
         // the leaves cover the domain, so the largest of their bounds holds everywhere
         for leaf in &waiting {
-            per_action.resize(leaf.bound.per_action.len(), 0.0);
-            for (largest, bound) in per_action.iter_mut().zip(&leaf.bound.per_action) {
-                *largest = largest.max(*bound);
+            for (largest, bound) in all.iter_mut().zip(&leaf.bounds) {
+                for (largest, bound) in largest.iter_mut().zip(&bound.per_action) {
+                    *largest = largest.max(*bound);
+                }
             }
         }
-        StateBound {
+        let of = |per_action| StateBound {
             bound: Bound::of(per_action),
             boxes: count,
-        }
+        };
+        all.into_iter().map(of).collect()
     }
 
-    /// Estimates the share of a domain that is covered by proven boxes: each of the states, drawn uniformly
-    /// ([`Domain::draw`]), follows the tree of halved boxes to a proven one, `depth` halvings at most.
+    /// Estimates the share of a domain that is covered by boxes in which an output has one proven action: each of the states, drawn
+    /// uniformly ([`Domain::draw`]), follows the tree of halved boxes to a proven one, `depth` halvings at most. `None` of an
+    /// output that makes no choice.
     #[must_use]
-    pub fn share(&self, domain: &Domain, points: &[Vec<f64>], depth: usize) -> Share {
-        let proven = points
-            .iter()
-            .filter(|point| self.is_in_proven_box(domain, point, depth));
-        Share::of(proven.count(), points.len())
+    pub fn shares(&self, domain: &Domain, points: &[Vec<f64>], depth: usize) -> Vec<Option<Share>> {
+        self.shares_of(points.iter().map(|point| self.proven_at(domain, point, depth)))
     }
 
-    fn is_in_proven_box(&self, domain: &Domain, point: &[f64], depth: usize) -> bool {
+    /// Whether each output is decided in a box of the tree that holds the point.
+    fn proven_at(&self, domain: &Domain, point: &[f64], depth: usize) -> Vec<bool> {
+        let mut proven: Vec<bool> = vec![false; self.parts.len()];
         let mut cell = domain.whole();
         for halvings in 1..=depth {
             let (lower, upper, along) = domain.halves(&cell);
@@ -160,20 +181,30 @@ impl Certifier {
             };
             // large boxes are hardly ever proven
             let is_looked_at = halvings % 4 == 0 || halvings == depth;
-            if is_looked_at && self.decided(domain, &cell).is_some() {
-                return true;
+            if !is_looked_at {
+                continue;
+            }
+            for (proven, decided) in proven.iter_mut().zip(self.decided(domain, &cell)) {
+                *proven |= decided.is_some();
+            }
+            let mut both = proven.iter().zip(&self.parts);
+            if both.all(|(proven, part)| *proven || !part.head.is_choice()) {
+                break;
             }
         }
-        false
+        proven
     }
 
-    /// Share of boxes around observations, `radius` times the width of each feature's bound to both sides, that have one
-    /// proven action.
+    /// Share of boxes around observations, `radius` times the width of each feature's bound to both sides, in which an output has
+    /// one proven action; `None` of an output that makes no choice.
     #[must_use]
-    pub fn share_around<'a>(&self, observations: impl IntoIterator<Item = &'a [f32]>, radius: f64) -> Share {
-        let (mut samples, mut proven) = (0, 0);
+    pub fn shares_around<'a>(
+        &self,
+        observations: impl IntoIterator<Item = &'a [f32]>,
+        radius: f64,
+    ) -> Vec<Option<Share>> {
         let whole = self.observations.whole();
-        for observation in observations {
+        let around = |observation: &'a [f32]| {
             let cell: Cell = observation
                 .iter()
                 .zip(&whole)
@@ -187,41 +218,66 @@ impl Certifier {
                     }
                 })
                 .collect();
-            samples += 1;
-            proven += usize::from(self.decided(&self.observations, &cell).is_some());
-        }
-        Share::of(proven, samples)
+            let decided = self.decided(&self.observations, &cell);
+            decided.iter().map(Option::is_some).collect()
+        };
+        self.shares_of(observations.into_iter().map(around))
     }
 
-    /// Splits a slice into boxes with one proven action, as far as that goes, and looks at a point of each box.
+    /// Counts, for each output, in how many of the places it is proven.
+    fn shares_of(&self, places: impl Iterator<Item = Vec<bool>>) -> Vec<Option<Share>> {
+        let (mut samples, mut counts) = (0, vec![0; self.parts.len()]);
+        for place in places {
+            samples += 1;
+            for (count, proven) in counts.iter_mut().zip(place) {
+                *count += usize::from(proven);
+            }
+        }
+        let both = self.parts.iter().zip(counts);
+        both.map(|(part, count)| part.head.is_choice().then(|| Share::of(count, samples)))
+            .collect()
+    }
+
+    /// Splits a slice into boxes with one proven action of each output, as far as that goes, and looks at a point of each box;
+    /// `None` of an output that makes no choice.
     #[must_use]
-    pub fn map(&self, domain: &Domain, slice: &Slice, q_values: &QValues<'_>) -> Map {
+    pub fn maps(&self, domain: &Domain, slice: &Slice, q_values: &QValues<'_>) -> Vec<Option<Map>> {
         let fine = 1 << SPLITS;
         let (columns, rows) = (COARSE.0 * fine, COARSE.1 * fine);
+        let blank = || Map {
+            slice: slice.clone(),
+            columns,
+            rows,
+            actions: vec![None; columns * rows],
+            proven_share: 0.0,
+            changes: Vec::new(),
+            measured: Measured::default(),
+            boxes: 0,
+        };
         let mut painter = Painter {
             certifier: self,
             domain,
             q_values,
-            map: Map {
-                slice: slice.clone(),
-                columns,
-                rows,
-                actions: vec![None; columns * rows],
-                proven_share: 0.0,
-                changes: Vec::new(),
-                measured: Measured::default(),
-                boxes: 0,
-            },
+            slice,
+            size: (columns, rows),
+            maps: self
+                .parts
+                .iter()
+                .map(|part| part.head.is_choice().then(blank))
+                .collect(),
         };
+        let open: Vec<bool> = painter.maps.iter().map(Option::is_some).collect();
         for row in (0..rows).step_by(fine) {
             for column in (0..columns).step_by(fine) {
-                painter.paint(column, row, fine);
+                painter.paint((column, row), fine, &open);
             }
         }
-        let mut map = painter.map;
-        let proven = map.actions.iter().filter(|action| action.is_some()).count();
-        map.proven_share = proven as f64 / map.actions.len() as f64;
-        map
+        let mut maps = painter.maps;
+        for map in maps.iter_mut().flatten() {
+            let proven = map.actions.iter().filter(|action| action.is_some()).count();
+            map.proven_share = proven as f64 / map.actions.len() as f64;
+        }
+        maps
     }
 }
 
@@ -229,42 +285,53 @@ struct Painter<'a> {
     certifier: &'a Certifier,
     domain: &'a Domain,
     q_values: &'a QValues<'a>,
-    map: Map,
+    slice: &'a Slice,
+    /// Finest columns and rows.
+    size: (usize, usize),
+    maps: Vec<Option<Map>>,
 }
 
 impl Painter<'_> {
-    /// A square of finest cells.
-    fn paint(&mut self, column: usize, row: usize, size: usize) {
-        let x = part(self.map.slice.x.1, column, size, self.map.columns);
-        let y = part(self.map.slice.y.1, row, size, self.map.rows);
-        let slice = &self.map.slice;
-        let mut cell: Cell = slice
-            .at
-            .iter()
-            .map(|&value| Interval {
-                low: value,
-                high: value,
-            })
-            .collect();
-        cell[slice.x.0] = x;
-        cell[slice.y.0] = y;
-        self.map.boxes += 1;
-        let action = self.certifier.decided(self.domain, &cell);
-        // a proven square is not split: what holds for the whole holds for its parts
-        if action.is_none() && size > 1 {
+    /// A square of finest cells, for the outputs that are not yet decided around it.
+    fn paint(&mut self, (column, row): (usize, usize), size: usize, open: &[bool]) {
+        let x = part(self.slice.x.1, column, size, self.size.0);
+        let y = part(self.slice.y.1, row, size, self.size.1);
+        let one = |&value: &f64| Interval {
+            low: value,
+            high: value,
+        };
+        let mut cell: Cell = self.slice.at.iter().map(one).collect();
+        cell[self.slice.x.0] = x;
+        cell[self.slice.y.0] = y;
+        let decided = self.certifier.decided(self.domain, &cell);
+        let point: Vec<f64> = cell.iter().map(|range| 0.5 * (range.low + range.high)).collect();
+        let mut seen = None;
+        let mut left = vec![false; open.len()];
+        for (index, action) in decided.into_iter().enumerate().filter(|(index, _)| open[*index]) {
+            let Some(map) = &mut self.maps[index] else { continue };
+            map.boxes += 1;
+            // a proven square is not split: what holds for the whole holds for its parts
+            if action.is_none() && size > 1 {
+                left[index] = true;
+                continue;
+            }
+            for row in row..row + size {
+                map.actions[row * map.columns + column..][..size].fill(action);
+            }
+            let seen = seen.get_or_insert_with(|| {
+                let observation = self.domain.observation(&point);
+                self.certifier.look(&observation, self.q_values)
+            });
+            let output = &self.certifier.parts[index];
+            if map.measured.add(output, &seen.real, &seen.held[index]) {
+                map.changes.push((0.5 * (x.low + x.high), 0.5 * (y.low + y.high)));
+            }
+        }
+        if left.contains(&true) {
             let half = size / 2;
             for (right, up) in [(0, 0), (half, 0), (0, half), (half, half)] {
-                self.paint(column + right, row + up, half);
+                self.paint((column + right, row + up), half, &left);
             }
-            return;
-        }
-        for row in row..row + size {
-            self.map.actions[row * self.map.columns + column..][..size].fill(action);
-        }
-        let point: Vec<f64> = cell.iter().map(|range| 0.5 * (range.low + range.high)).collect();
-        let observation = self.domain.observation(&point);
-        if self.certifier.add(&mut self.map.measured, &observation, self.q_values) {
-            self.map.changes.push((0.5 * (x.low + x.high), 0.5 * (y.low + y.high)));
         }
     }
 }

@@ -388,8 +388,9 @@ impl Affine {
 
 /// Name, unit and plausible range of what a source reads.
 fn described(policy: &Policy, input: Input) -> (String, String, Interval) {
-    let duties = |values: &mut dyn Iterator<Item = f64>| {
-        let start = [policy.limits.initial_duty, policy.fallback.duty];
+    let paths = policy.paths();
+    let duties = |path: &policy::DutyPath<'_>, values: &mut dyn Iterator<Item = f64>| {
+        let start = [path.limits.initial_duty, path.fallback];
         let (low, high) = start
             .into_iter()
             .chain(values)
@@ -407,10 +408,6 @@ fn described(policy: &Policy, input: Input) -> (String, String, Interval) {
             Some(signal) => (signal.name.clone(), signal.unit.clone(), signal.range),
             None => ("?".to_owned(), String::new(), Interval { low: 0.0, high: 0.0 }),
         },
-        Input::PreviousDuty => {
-            let mut chosen = policy.head.duties().into_iter();
-            ("previous_duty".to_owned(), String::new(), duties(&mut chosen))
-        }
         Input::Estimate(index, estimate) => {
             let range = policy.observers.get(index).map(|observer| observer.range(estimate));
             let range = range.unwrap_or(Interval { low: 0.0, high: 0.0 });
@@ -422,15 +419,23 @@ fn described(policy: &Policy, input: Input) -> (String, String, Interval) {
             };
             (name, estimate.unit().to_owned(), rounded)
         }
-        Input::PreviousCommand => {
-            let limits = policy.limits.duty;
-            let mut ends = [limits.low, limits.high].into_iter();
-            ("previous_command".to_owned(), String::new(), duties(&mut ends))
-        }
-        // contracts with several outputs are refused when they are read: no duty is outside of this
-        Input::OutputDuty(_) | Input::OutputCommand(_) => {
-            let name = input.name(&policy.signals, &policy.observers);
-            (name, String::new(), Interval { low: 0.0, high: 1.0 })
+        Input::PreviousDuty | Input::PreviousCommand | Input::OutputDuty(_) | Input::OutputCommand(_) => {
+            let (index, word) = match input {
+                Input::OutputDuty(index) => (index, "previous_duty"),
+                Input::OutputCommand(index) => (index, "previous_command"),
+                Input::PreviousDuty => (0, "previous_duty"),
+                _ => (0, "previous_command"),
+            };
+            let Some(path) = paths.get(index) else {
+                // the reader knows every output that a source names; no duty is outside of this
+                return (word.to_owned(), String::new(), Interval { low: 0.0, high: 1.0 });
+            };
+            let name = path.name.map_or(word.to_owned(), |name| format!("{name}_{word}"));
+            let range = match word {
+                "previous_duty" => duties(path, &mut path.head.duties().into_iter()),
+                _ => duties(path, &mut [path.limits.duty.low, path.limits.duty.high].into_iter()),
+            };
+            (name, String::new(), range)
         }
     }
 }

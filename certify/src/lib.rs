@@ -22,20 +22,24 @@ mod network;
 mod neurons;
 #[cfg(feature = "page")]
 pub mod page;
+mod part;
 mod past;
 mod propagate;
 mod slice;
+#[cfg(feature = "page")]
+mod summary;
 
-use policy::{Head, Interval, Policy};
+use policy::{Interval, Policy};
 use serde::Serialize;
 
-pub use certificate::{Certificate, Effort, Golden, Neighbourhood};
+pub use certificate::{Certificate, Effort, Golden, Neighbourhood, Statement};
 pub use cover::{Map, Share, Slice, StateBound};
 pub use domain::{AffineCopy, Cell, Coordinate, Domain, Memory};
 pub use measured::{Measured, QValues};
 pub use neurons::Neurons;
 
 use network::Network;
+use part::Part;
 use propagate::Enclosure;
 
 /// Bounds of a policy's numeric format.
@@ -43,8 +47,8 @@ use propagate::Enclosure;
 pub struct Certifier {
     network: Network,
     observations: Domain,
-    /// Where it makes no choice bounds are of the duty.
-    head: Head,
+    /// What is decided from which columns: a bound is of Q values where it makes a choice, and else of the duty.
+    parts: Vec<Part>,
 }
 
 /// Proven bound of |Q in the format - real Q|, or of a head without a choice of |duty in the format - real duty|.
@@ -72,50 +76,33 @@ impl Certifier {
         Self {
             network: Network::new(policy),
             observations: Domain::observations(policy),
-            head: policy.head.clone(),
+            parts: Part::all(policy),
         }
     }
 
-    /// Bound over every observation of the clamped box, the features independent of each other.
+    /// Bound over every observation of the clamped box, the features independent of each other; of a contract with several
+    /// outputs those of all, one after the other.
     #[must_use]
     pub fn box_bound(&self) -> Bound {
-        let whole = self.observations.whole();
-        self.bound_over(&self.observations, &whole)
+        Bound::of(
+            self.box_bounds()
+                .into_iter()
+                .flat_map(|bound| bound.per_action)
+                .collect(),
+        )
     }
 
-    /// Bound over a cell of a domain.
+    /// [`Certifier::box_bound`] of each output.
     #[must_use]
-    pub fn bound_over(&self, domain: &Domain, cell: &[Interval]) -> Bound {
+    pub fn box_bounds(&self) -> Vec<Bound> {
+        self.bounds_over(&self.observations, &self.observations.whole())
+    }
+
+    /// Bounds over a cell of a domain, one for each output, all from one pass over the network.
+    #[must_use]
+    pub fn bounds_over(&self, domain: &Domain, cell: &[Interval]) -> Vec<Bound> {
         let enclosure = self.enclose(domain, cell);
-        let outputs = 0..enclosure.real.len();
-        Bound::of(match &self.head {
-            Head::Choice(_) | Head::Residual(_) => outputs.map(|action| enclosure.error_bound(action)).collect(),
-            Head::Continuous(head) => vec![actor::duty_bound(head, enclosure.q_value(0), enclosure.error_bound(0))],
-            Head::Schedule(head) => {
-                let outputs: Vec<_> = outputs
-                    .map(|output| (enclosure.q_value(output), enclosure.error_bound(output)))
-                    .collect();
-                vec![law::duty_bound(head, &outputs)]
-            }
-            // what each output has: of a choice its Q values, of an actor its duty
-            Head::Several(all) => all
-                .iter()
-                .flat_map(|output| match &output.head {
-                    Head::Continuous(head) => {
-                        let at = output.column;
-                        vec![actor::duty_bound(
-                            head,
-                            enclosure.q_value(at),
-                            enclosure.error_bound(at),
-                        )]
-                    }
-                    own => {
-                        let columns = output.column..output.column + own.outputs();
-                        columns.map(|column| enclosure.error_bound(column)).collect()
-                    }
-                })
-                .collect(),
-        })
+        self.parts.iter().map(|part| part.bound(&enclosure)).collect()
     }
 
     /// Enclosures of the real Q values over a cell of a domain.
@@ -127,12 +114,12 @@ impl Certifier {
             .collect()
     }
 
-    /// The greedy action of a cell, if it is proven to be the same everywhere in it, in real arithmetic and in the format.
+    /// The greedy action of each output over a cell, if it is proven to be the same everywhere in it, in real arithmetic and in the
+    /// format; `None` of an output that makes no choice.
     #[must_use]
-    pub fn decided(&self, domain: &Domain, cell: &[Interval]) -> Option<usize> {
+    pub fn decided(&self, domain: &Domain, cell: &[Interval]) -> Vec<Option<usize>> {
         let enclosure = self.enclose(domain, cell);
-        let action = enclosure.candidate();
-        enclosure.decides(action).then_some(action)
+        self.parts.iter().map(|part| part.decided(&enclosure)).collect()
     }
 
     /// The domain of all observations of the clamped box.

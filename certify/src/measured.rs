@@ -6,8 +6,10 @@ use serde::Serialize;
 use crate::Certifier;
 use crate::form::Form;
 use crate::network::Network;
+use crate::part::Part;
 
-/// Q values of an observation in the policy's numeric format, the duty of a continuous actor, or the gains of a gain schedule; the interpreter's, so that this crate shares nothing with it.
+/// Q values of an observation in the policy's numeric format, the duty of a continuous actor, or the gains of a gain schedule; of
+/// several outputs what each has of these, one after the other. The interpreter's, so that this crate shares nothing with it.
 pub type QValues<'a> = dyn Fn(&[f32]) -> Vec<f64> + 'a;
 
 /// Differences seen at observations.
@@ -33,9 +35,11 @@ impl Certifier {
         (0..real.len()).map(|action| real.bounds(action)).collect()
     }
 
-    /// Greedy action of the real network at an observation, up to ties.
-    pub(crate) fn real_action(&self, observation: &[f32]) -> usize {
-        argmax(&self.real(observation).centre)
+    /// Greedy actions of the real network at an observation, up to ties: one for each output that makes a choice.
+    pub(crate) fn real_actions(&self, observation: &[f32]) -> Vec<usize> {
+        let centre = self.real(observation).centre;
+        let choices = self.parts.iter().filter(|part| part.head.is_choice());
+        choices.map(|part| argmax(&centre[part.columns.clone()])).collect()
     }
 
     fn real(&self, observation: &[f32]) -> Form {
@@ -45,67 +49,96 @@ impl Certifier {
         Network::real(&self.network, x)
     }
 
-    /// Compares the format with real arithmetic at observations.
+    /// Compares the format with real arithmetic at observations: what is seen of each output.
     #[must_use]
-    pub fn measure<'a>(&self, observations: impl IntoIterator<Item = &'a [f32]>, q_values: &QValues<'_>) -> Measured {
-        let mut measured = Measured::default();
+    pub fn measure<'a>(
+        &self,
+        observations: impl IntoIterator<Item = &'a [f32]>,
+        q_values: &QValues<'_>,
+    ) -> Vec<Measured> {
+        let mut all = vec![Measured::default(); self.parts.len()];
         for observation in observations {
-            self.add(&mut measured, observation, q_values);
-        }
-        measured
-    }
-
-    /// Error of the duty of a head without a choice, of real outputs and what the format makes of them; infinite if that is too
-    /// little. Of a gain schedule with the largest factors, for an observation does not say them.
-    fn duty_error(&self, real: &[f64], held: &[f64]) -> Option<f64> {
-        let whole = real.len() == held.len();
-        let error = match &self.head {
-            // contracts with several outputs are refused when they are read
-            Head::Choice(_) | Head::Residual(_) | Head::Several(_) => return None,
-            _ if !whole => f64::INFINITY,
-            Head::Continuous(head) => real
-                .iter()
-                .zip(held)
-                .map(|(y, held)| (head.duty(*y) - held).abs())
-                .sum(),
-            Head::Schedule(head) => {
-                let errors = head.gains.iter().zip(real.iter().zip(held));
-                errors
-                    .map(|(gain, (y, held))| gain.largest_factor() * (gain.value(*y) - held).abs())
-                    .sum()
+            let seen = self.look(observation, q_values);
+            for ((measured, part), held) in all.iter_mut().zip(&self.parts).zip(&seen.held) {
+                measured.add(part, &seen.real, held);
             }
-        };
-        Some(error)
+        }
+        all
     }
 
-    /// Adds one observation; whether its action changes.
-    pub(crate) fn add(&self, measured: &mut Measured, observation: &[f32], q_values: &QValues<'_>) -> bool {
-        let real = self.real(observation);
-        let held = q_values(observation);
-        if let Some(error) = self.duty_error(&real.centre, &held) {
-            measured.largest_error = measured.largest_error.max(error);
-            measured.observations += 1;
+    /// Both networks at one observation.
+    pub(crate) fn look(&self, observation: &[f32], q_values: &QValues<'_>) -> Seen {
+        let mut answers = q_values(observation).into_iter();
+        let held = self
+            .parts
+            .iter()
+            .map(|part| answers.by_ref().take(part.answers()).collect());
+        Seen {
+            real: self.real(observation),
+            held: held.collect(),
+        }
+    }
+}
+
+/// What both networks say at one observation.
+pub(crate) struct Seen {
+    pub real: Form,
+    /// By output: [`QValues`].
+    pub held: Vec<Vec<f64>>,
+}
+
+/// Error of the duty of a head without a choice, of real outputs and what the format makes of them; infinite if that is too
+/// little. Of a gain schedule with the largest factors, for an observation does not say them.
+fn duty_error(head: &Head, real: &[f64], held: &[f64]) -> Option<f64> {
+    let whole = real.len() == held.len();
+    let error = match head {
+        // several outputs are parts, each with a head of its own
+        Head::Choice(_) | Head::Residual(_) | Head::Several(_) => return None,
+        _ if !whole => f64::INFINITY,
+        Head::Continuous(head) => real
+            .iter()
+            .zip(held)
+            .map(|(y, held)| (head.duty(*y) - held).abs())
+            .sum(),
+        Head::Schedule(head) => {
+            let errors = head.gains.iter().zip(real.iter().zip(held));
+            errors
+                .map(|(gain, (y, held))| gain.largest_factor() * (gain.value(*y) - held).abs())
+                .sum()
+        }
+    };
+    Some(error)
+}
+
+impl Measured {
+    /// Adds what is seen of one output at one observation; whether its action changes.
+    pub(crate) fn add(&mut self, part: &Part, real: &Form, held: &[f64]) -> bool {
+        let centre = &real.centre[part.columns.clone()];
+        if let Some(error) = duty_error(&part.head, centre, held) {
+            self.largest_error = self.largest_error.max(error);
+            self.observations += 1;
             return false;
         }
-        let errors = real.centre.iter().zip(&held).map(|(real, held)| (real - held).abs());
-        measured.largest_error = errors.fold(measured.largest_error, f64::max);
-        let (low, high) = real
-            .centre
+        let errors = centre.iter().zip(held).map(|(real, held)| (real - held).abs());
+        self.largest_error = errors.fold(self.largest_error, f64::max);
+        let (low, high) = centre
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| {
                 (low.min(*q), high.max(*q))
             });
-        let before = measured.observations as f64;
-        measured.mean_spread = (measured.mean_spread * before + (high - low)) / (before + 1.0);
-        measured.observations += 1;
+        let before = self.observations as f64;
+        self.mean_spread = (self.mean_spread * before + (high - low)) / (before + 1.0);
+        self.observations += 1;
         // what was given up is counted in real Q: the format's own values would flatter it
-        let chosen = argmax(&held);
-        measured.largest_loss = measured
-            .largest_loss
-            .max(high - real.centre.get(chosen).copied().unwrap_or(high));
+        let chosen = argmax(held);
+        let given_up = high - centre.get(chosen).copied().unwrap_or(high);
+        self.largest_loss = self.largest_loss.max(given_up);
         // real arithmetic must prefer another action by more than binary64 can err
-        let is_changed = (0..real.len()).any(|other| other != chosen && real.difference(None, other, chosen).low > 0.0);
-        measured.changed_actions += usize::from(is_changed);
+        let first = part.columns.start;
+        let mut others = part.columns.clone().filter(|other| *other != first + chosen);
+        let is_changed =
+            chosen < centre.len() && others.any(|other| real.difference(None, other, first + chosen).low > 0.0);
+        self.changed_actions += usize::from(is_changed);
         is_changed
     }
 }

@@ -1,123 +1,32 @@
-//! A certificate for people: a few lines, a map, a page.
+//! A certificate for people: maps and a page.
 
 use std::collections::BTreeSet;
 
-use policy::{Interval, Policy};
-use report::{Axis, Cell, HeatMap, Page, Ramp, ReportError, Section, Svg, Table, Verdict, grouped, quantity};
+use policy::{Action, Head, Interval, Policy};
+use report::{Axis, Cell, HeatMap, Page, Ramp, ReportError, Section, Svg, Table, Verdict, grouped};
 
-use crate::{Certificate, Coordinate, Domain, Map, Measured, Memory, Share};
+use crate::summary::{changed_text, digits, loss_text, share_text};
+use crate::{Certificate, Coordinate, Domain, Map, Memory, Statement};
 
-/// The answer in a few lines; errors have the unit of Q.
-#[must_use]
-pub fn summary(certificate: &Certificate) -> String {
-    if let Some(span) = certificate.duty_span() {
-        return of_actor(certificate, span);
-    }
-    let bound = certificate.state_bound.bound.largest;
-    let measured = &certificate.measured;
-    let mut lines = vec![
-        format!(
-            "{} in {}: |Q - real Q| <= {} for every state, {} for every observation of the clamped box (proven)",
-            certificate.name,
-            certificate.numeric_format.name(),
-            digits(bound),
-            digits(certificate.box_bound.largest)
-        ),
-        format!(
-            "  largest seen: {} at {} states; real Q values of a state are {} apart on average",
-            digits(measured.largest_error),
-            grouped(measured.observations as u64),
-            digits(measured.mean_spread)
-        ),
-    ];
-    lines.extend(certificate.proven_share.as_ref().map(|share| {
-        format!(
-            "  action provably unchanged: {} of the states; seen to change at {}",
-            share_text(share),
-            changed_text(measured)
-        )
-    }));
-    if let Some(golden) = &certificate.golden {
-        lines.push(format!(
-            "  golden observations: largest error {}, action changed at {}; {}",
-            digits(golden.measured.largest_error),
-            changed_text(&golden.measured),
-            loss_text(&golden.measured)
-        ));
-    }
-    if let Some(map) = &certificate.map {
-        lines.push(format!(
-            "  map: {:.1} % of the area provably unchanged, changes seen at {}",
-            100.0 * map.proven_share,
-            changed_text(&map.measured)
-        ));
-    }
-    lines.join("\n")
-}
+pub use crate::summary::summary;
 
-fn of_actor(certificate: &Certificate, span: f64) -> String {
-    let measured = &certificate.measured;
-    let mut lines = vec![
-        format!(
-            "{} in {}: |duty - real duty| <= {} for every state, {} for every observation of the clamped box (proven); the duty's range is {}",
-            certificate.name,
-            certificate.numeric_format.name(),
-            digits(certificate.state_bound.bound.largest),
-            digits(certificate.box_bound.largest),
-            digits(span)
-        ),
-        format!(
-            "  largest seen: {} at {} states",
-            digits(measured.largest_error),
-            grouped(measured.observations as u64)
-        ),
-    ];
-    lines.extend(certificate.golden.as_ref().map(|golden| {
-        format!(
-            "  golden observations: largest error {}",
-            digits(golden.measured.largest_error)
-        )
-    }));
-    lines.join("\n")
-}
-
-/// The largest loss in Q, and as `compile` and `verify` say it: as a share of the operating range of Q.
-fn loss_text(measured: &Measured) -> String {
-    // a network with one value for all actions has no range: a loss of 0 is 0 of it
-    let range = measured.mean_spread.max(f64::MIN_POSITIVE);
-    format!(
-        "the worst change gives up {} of Q: {} of the operating range of Q, which is {} (mean of best less worst Q)",
-        digits(measured.largest_loss),
-        digits(measured.largest_loss / range),
-        digits(measured.mean_spread)
-    )
-}
-
-/// Three significant digits.
-fn digits(value: f64) -> String {
-    quantity(value, "", 3)
-}
-
-fn share_text(share: &Share) -> String {
-    format!(
-        "{:.1} % (95 %: {:.1} to {:.1} %)",
-        100.0 * share.proven as f64 / share.samples.max(1) as f64,
-        100.0 * share.low,
-        100.0 * share.high
-    )
-}
-
-fn changed_text(measured: &Measured) -> String {
-    let (changed, all) = (measured.changed_actions as u64, measured.observations as u64);
-    format!("{} of {}", grouped(changed), grouped(all))
-}
-
-/// The slice of a certificate of `policy` as a picture, if it has one and a cell of it is proven.
+/// The slices of a certificate of `policy` as pictures: one for each output, if it has a map and a cell of it is proven.
 ///
 /// # Errors
-/// If its axes have no extent.
-pub fn map(policy: &Policy, certificate: &Certificate) -> Result<Option<Svg>, ReportError> {
-    let Some(map) = &certificate.map else { return Ok(None) };
+/// If an axis has no extent.
+pub fn maps(policy: &Policy, certificate: &Certificate) -> Result<Vec<Option<Svg>>, ReportError> {
+    let heads = policy.paths().into_iter().map(|path| path.head);
+    let both = certificate.statements.iter().zip(heads);
+    both.map(|(statement, head)| picture(policy, certificate, (statement, head.actions())))
+        .collect()
+}
+
+fn picture(
+    policy: &Policy,
+    certificate: &Certificate,
+    (statement, actions): (&Statement, &[Action]),
+) -> Result<Option<Svg>, ReportError> {
+    let Some(map) = &statement.map else { return Ok(None) };
     let domain = Domain::of(policy, map.slice.memory);
     let axis = |index: usize| {
         let axis = |coordinate: &Coordinate| Axis::new(coordinate.name.as_str()).unit(&coordinate.unit);
@@ -129,14 +38,15 @@ pub fn map(policy: &Policy, certificate: &Certificate) -> Result<Option<Svg>, Re
             .collect()
     };
     let duty = |action: &Option<usize>| {
-        let action = action.and_then(|action| policy.actions().get(action));
+        let action = action.and_then(|action| actions.get(action));
         action.map_or(f64::NAN, |action| action.duty)
     };
     let cells: Vec<f64> = map.actions.iter().map(duty).collect();
     let title = format!(
-        "{} in {}: proven actions",
+        "{} in {}: proven actions{}",
         certificate.name,
-        certificate.numeric_format.name()
+        certificate.numeric_format.name(),
+        statement.of()
     );
     let mut picture = HeatMap::new(title, axis(map.slice.x.0), axis(map.slice.y.0))
         .values(
@@ -168,22 +78,51 @@ fn thinned(map: &Map) -> Vec<(f64, f64)> {
     map.changes.iter().copied().filter(is_first).collect()
 }
 
-/// The whole page as HTML; `picture` is that of [`map`].
+/// The whole page as HTML; `pictures` are those of [`maps`].
 ///
 /// # Errors
 /// Never, in fact: its tables have the columns that they say.
-pub fn page(policy: &Policy, certificate: &Certificate, picture: Option<Svg>) -> Result<String, ReportError> {
+pub fn page(policy: &Policy, certificate: &Certificate, pictures: Vec<Option<Svg>>) -> Result<String, ReportError> {
     let format = certificate.numeric_format.name();
-    if let Some(span) = certificate.duty_span() {
-        return actor_page(policy, certificate, span);
+    let statements = &certificate.statements;
+    let decides = statements.iter().any(|statement| statement.duty_span().is_none());
+    let subject = match (statements.len(), decides) {
+        (1, true) => "decision",
+        (1, false) => "duty",
+        _ => "outputs",
+    };
+    let said = statements.iter().map(|statement| match statement.duty_span() {
+        Some(span) => of_actor(format, statement, span),
+        None => of_choice(format, statement),
+    });
+    let (verdicts, sentences): (Vec<Verdict>, Vec<String>) = said.unzip();
+    let verdict = match verdicts.contains(&Verdict::Warn) {
+        true => Verdict::Warn,
+        false => Verdict::Note,
+    };
+    let title = format!("{}: what {format} does to the {subject}", certificate.name);
+    let mut page = Page::new(title).verdict(verdict, sentences.join(" "));
+    let paths = policy.paths();
+    for ((statement, path), picture) in statements.iter().zip(&paths).zip(pictures) {
+        page = match statement.duty_span() {
+            Some(span) => page.section(duty(statement, span)),
+            None => page.section(bounds(path.head, statement)).section(shares(statement)),
+        };
+        if let Some(map) = &statement.map {
+            page = page.section(map_section(policy, statement, map, picture));
+        }
     }
+    page.section(meaning(policy, certificate)).html()
+}
+
+fn of_choice(format: &str, statement: &Statement) -> (Verdict, String) {
     let sentence = format!(
-        "In {format} no Q value differs from real arithmetic by more than {} in any state; the action provably stays the same in {} of the states.",
-        digits(certificate.state_bound.bound.largest),
-        certificate.proven_share.as_ref().map(share_text).unwrap_or_default()
+        "In {format} no Q value{} differs from real arithmetic by more than {} in any state; the action provably stays the same in {} of the states.",
+        statement.of(),
+        digits(statement.state_bound.bound.largest),
+        statement.proven_share.as_ref().map(share_text).unwrap_or_default()
     );
-    let golden = certificate.golden.as_ref().map(|golden| &golden.measured);
-    let (verdict, sentence) = match golden {
+    match statement.golden.as_ref().map(|golden| &golden.measured) {
         Some(golden) if golden.changed_actions > 0 => (
             Verdict::Warn,
             format!(
@@ -192,85 +131,77 @@ pub fn page(policy: &Policy, certificate: &Certificate, picture: Option<Svg>) ->
             ),
         ),
         _ => (Verdict::Note, sentence),
-    };
-    let mut page = Page::new(format!("{}: what {format} does to the decision", certificate.name))
-        .verdict(verdict, sentence)
-        .section(bounds(policy, certificate))
-        .section(shares(certificate));
-    if let Some(map) = &certificate.map {
-        page = page.section(map_section(policy, map, picture));
     }
-    page.section(meaning(policy, certificate)).html()
 }
 
-/// The page of a head without a choice: no actions, no map.
-fn actor_page(policy: &Policy, certificate: &Certificate, span: f64) -> Result<String, ReportError> {
-    let format = certificate.numeric_format.name();
-    let bound = certificate.state_bound.bound.largest;
+fn of_actor(format: &str, statement: &Statement, span: f64) -> (Verdict, String) {
+    let bound = statement.state_bound.bound.largest;
     let sentence = format!(
-        "In {format} no duty differs from real arithmetic by more than {} in any state, which is {:.2} % of the duty's range.",
+        "In {format} no duty{} differs from real arithmetic by more than {} in any state, which is {:.2} % of the duty's range.",
+        statement.of(),
         digits(bound),
         100.0 * bound / span
     );
+    (Verdict::Note, sentence)
+}
+
+/// Of a head without a choice: no actions, no map.
+fn duty(statement: &Statement, span: f64) -> Section {
     let mut pairs = vec![
-        ("proven for every state", digits(bound)),
+        ("proven for every state", digits(statement.state_bound.bound.largest)),
         (
             "proven for every observation of the clamped box",
-            digits(certificate.box_bound.largest),
+            digits(statement.box_bound.largest),
         ),
         (
             "largest seen",
             format!(
                 "{} at {} random states",
-                digits(certificate.measured.largest_error),
-                grouped(certificate.measured.observations as u64)
+                digits(statement.measured.largest_error),
+                grouped(statement.measured.observations as u64)
             ),
         ),
     ];
-    pairs.extend(certificate.golden.as_ref().map(|golden| {
+    pairs.extend(statement.golden.as_ref().map(|golden| {
         (
             "largest seen at the golden observations",
             digits(golden.measured.largest_error),
         )
     }));
     pairs.push(("range of the duty", digits(span)));
-    Page::new(format!("{}: what {format} does to the duty", certificate.name))
-        .verdict(Verdict::Note, sentence)
-        .section(Section::new("Error of the duty before the mapping").pairs(pairs))
-        .section(meaning(policy, certificate))
-        .html()
+    Section::new(format!("Error of the duty{} before the mapping", statement.of())).pairs(pairs)
 }
 
 /// What an action is: a duty, or what it adds to that of a law.
-fn offered(policy: &Policy) -> &'static str {
-    match policy.head.residual() {
+fn offered(head: &Head) -> &'static str {
+    match head.residual() {
         Some(_) => "offset",
         None => "duty",
     }
 }
 
-fn bounds(policy: &Policy, certificate: &Certificate) -> Section {
+fn bounds(head: &Head, statement: &Statement) -> Section {
     let mut table = Table::new("Proven bounds of |Q in the format - real Q|")
         .text("action")
-        .number(offered(policy), 4)
+        .number(offered(head), 4)
         .text("every state")
         .text("every observation of the box");
-    for (index, action) in policy.actions().iter().enumerate() {
+    for (index, action) in head.actions().iter().enumerate() {
         let bound = |bounds: &[f64]| Cell::Text(bounds.get(index).map(|b| digits(*b)).unwrap_or_default());
         table = table.row([
             Cell::Text(index.to_string()),
             Cell::Number(action.duty),
-            bound(&certificate.state_bound.bound.per_action),
-            bound(&certificate.box_bound.per_action),
+            bound(&statement.state_bound.bound.per_action),
+            bound(&statement.box_bound.per_action),
         ]);
     }
-    let measured = &certificate.measured;
-    Section::new("Error of the Q values")
+    let measured = &statement.measured;
+    Section::new(format!("Error of the Q values{}", statement.of()))
         .pairs([
-            ("proven for every state", digits(certificate.state_bound.bound.largest)),
+            ("proven for every state", digits(statement.state_bound.bound.largest)),
             (
                 "proven for every observation of the clamped box",
-                digits(certificate.box_bound.largest),
+                digits(statement.box_bound.largest),
             ),
             (
                 "largest seen",
@@ -288,18 +219,18 @@ fn bounds(policy: &Policy, certificate: &Certificate) -> Section {
         .details(Section::new("Per action").table(table))
 }
 
-fn shares(certificate: &Certificate) -> Section {
+fn shares(statement: &Statement) -> Section {
     let mut pairs = vec![
         (
             "states whose action provably cannot change".to_owned(),
-            certificate.proven_share.as_ref().map(share_text).unwrap_or_default(),
+            statement.proven_share.as_ref().map(share_text).unwrap_or_default(),
         ),
         (
             "random states at which it was seen to change".to_owned(),
-            changed_text(&certificate.measured),
+            changed_text(&statement.measured),
         ),
     ];
-    if let Some(golden) = &certificate.golden {
+    if let Some(golden) = &statement.golden {
         pairs.push((
             "golden observations at which it was seen to change".to_owned(),
             format!(
@@ -319,10 +250,10 @@ fn shares(certificate: &Certificate) -> Section {
             ));
         }
     }
-    Section::new("Action").pairs(pairs)
+    Section::new(format!("Action{}", statement.of())).pairs(pairs)
 }
 
-fn map_section(policy: &Policy, map: &Map, picture: Option<Svg>) -> Section {
+fn map_section(policy: &Policy, statement: &Statement, map: &Map, picture: Option<Svg>) -> Section {
     let domain = Domain::of(policy, map.slice.memory);
     let fixed: Vec<String> = domain
         .coordinates()
@@ -341,7 +272,7 @@ fn map_section(policy: &Policy, map: &Map, picture: Option<Svg>) -> Section {
         },
         fixed.join(", ")
     );
-    let section = Section::new("Where on the map").pairs([
+    let section = Section::new(format!("Where on the map{}", statement.of())).pairs([
         ("proven share of the area", format!("{:.1} %", 100.0 * map.proven_share)),
         (
             "points at which the action was seen to change",

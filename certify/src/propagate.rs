@@ -15,6 +15,8 @@
 //! In: the observations of a cell. Out: a form of the real Q values and one of the error. The one invariant: both have the same
 //! shared symbols, so a Q value of the format is their sum, and what moves together cancels in a difference.
 
+use std::ops::Range;
+
 use policy::activation::Curve;
 use policy::{Activation, Interval, Shape};
 
@@ -34,26 +36,22 @@ impl Enclosure {
         self.error.magnitude(action)
     }
 
-    /// Whether the greedy action of the real network and that of the format are this one everywhere.
-    pub fn decides(&self, action: usize) -> bool {
+    /// Whether the greedy action among some columns is this one everywhere, in the real network and in the format.
+    pub fn decides(&self, columns: &Range<usize>, action: usize) -> bool {
         let beats = |other: usize, error: Option<&Form>| self.real.difference(error, action, other).low > 0.0;
-        (0..self.real.len())
-            .filter(|other| *other != action)
-            .all(|other| beats(other, Some(&self.error)) && beats(other, None))
+        let mut others = columns.clone().filter(|other| *other != action);
+        others.all(|other| beats(other, Some(&self.error)) && beats(other, None))
     }
 
-    /// The action with the largest centre.
-    pub fn candidate(&self) -> usize {
+    /// The column with the largest centre among some.
+    pub fn candidate(&self, columns: &Range<usize>) -> usize {
         // no other can be proven: a difference that is positive over the cell is so at its centre
-        let centres = self.real.centre.iter().enumerate();
-        centres
-            .fold(
-                (0, f64::NEG_INFINITY),
-                |best, (index, &q)| {
-                    if q > best.1 { (index, q) } else { best }
-                },
-            )
-            .0
+        let first = (columns.start, f64::NEG_INFINITY);
+        let larger = |best: (usize, f64), column| match self.real.centre[column] {
+            q if q > best.1 => (column, q),
+            _ => best,
+        };
+        columns.clone().fold(first, larger).0
     }
 
     /// Enclosure of the real Q value of an action.

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use policy::{DutyPath, Head};
+
 use crate::machine::{I32, Kind, Number, Place, U32, Value, Wrong, number};
 use crate::refusal::Refusal;
 use crate::spec::{Command, Spec, State};
@@ -31,8 +33,8 @@ pub(crate) trait Emitted {
     fn observe(&self, state: &State, measurement: &[Term]) -> Result<Vec<Term>, Refusal>;
     fn init(&self, state: &State) -> Result<State, Refusal>;
     fn reset(&self, state: &State) -> Result<State, Refusal>;
-    /// The state behind it, and 1 or 0 of 32 bits.
-    fn set_mapping(&self, state: &State, coefficients: &[Term]) -> Result<(State, Term), Refusal>;
+    /// That of one output: the state behind it, and 1 or 0 of 32 bits.
+    fn set_mapping(&self, path: &DutyPath<'_>, state: &State, coefficients: &[Term]) -> Result<(State, Term), Refusal>;
     /// A helper by its name without prefix, if the code has one: numbers in, a number out, and what has to hold.
     fn helper(&self, name: &str, arguments: &[Number]) -> Option<Result<(Number, Vec<Term>), Refusal>>;
 }
@@ -56,7 +58,7 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// One number an action, anew for every run: a second run could see another observation.
+    /// One number a column, anew for every run: a second run could see another observation.
     pub(crate) fn answer(&mut self) -> Vec<Value> {
         let run = self.observations.len();
         let start = match self.spec.policy.numeric_format.is_integer() {
@@ -84,14 +86,15 @@ fn value(term: Term, kind: Kind) -> Value {
     Value::Number(Number { term, kind })
 }
 
+/// Names of the coefficients of a mapping; the last in the four-term form alone.
+const COEFFICIENTS: [&str; 4] = ["a", "b", "c", "r"];
+
 /// The state as a record; both languages call the parts alike.
 pub(crate) fn state_record(spec: Spec<'_>, state: &State) -> Value {
     let float = |term: &Term| value(*term, Kind::Float(spec.float.format));
     let list = |terms: Vec<&Term>| Value::List(terms.into_iter().map(float).collect());
     let mut members = BTreeMap::from([
         ("held".to_owned(), list(state.held.iter().collect())),
-        ("previous_duty".to_owned(), float(&state.previous_duty)),
-        ("previous_command".to_owned(), float(&state.previous_command)),
         ("bad_count".to_owned(), value(state.bad_count, U32)),
         ("primed".to_owned(), value(state.primed, U32)),
     ]);
@@ -99,24 +102,29 @@ pub(crate) fn state_record(spec: Spec<'_>, state: &State) -> Value {
     if !memory.is_empty() {
         members.insert("memory".to_owned(), list(memory));
     }
-    members.extend(state.soft_cap.iter().map(|cap| ("soft_cap".to_owned(), float(cap))));
-    for (name, coefficient) in ["a", "b", "c", "r"].into_iter().zip(&state.coefficients) {
-        members.insert(format!("mapping_{name}"), float(coefficient));
-    }
     let word = Kind::Integer {
         bits: spec.float.width(),
         signed: false,
     };
-    members.extend(
-        state
-            .check
-            .map(|check| ("mapping_check".to_owned(), value(check, word))),
-    );
+    for (path, own) in spec.policy.paths().iter().zip(&state.outputs) {
+        let mut add = |stem: &str, value| members.insert(path.named(stem), value);
+        add("previous_duty", float(&own.previous_duty));
+        add("previous_command", float(&own.previous_command));
+        own.soft_cap.iter().for_each(|cap| {
+            add("soft_cap", float(cap));
+        });
+        for (name, coefficient) in COEFFICIENTS.into_iter().zip(&own.coefficients) {
+            add(&format!("mapping_{name}"), float(coefficient));
+        }
+        own.check.iter().for_each(|check| {
+            add("mapping_check", value(*check, word));
+        });
+    }
     Value::Record(members)
 }
 
 /// The record back as a state of the form of `like`.
-pub(crate) fn state_of(value: &Value, like: &State) -> Result<State, Wrong> {
+pub(crate) fn state_of(spec: Spec<'_>, value: &Value, like: &State) -> Result<State, Wrong> {
     let Value::Record(members) = value else {
         return Err("a state that is no record".into());
     };
@@ -131,13 +139,16 @@ pub(crate) fn state_of(value: &Value, like: &State) -> Result<State, Wrong> {
     for word in state.memory_mut() {
         *word = words.next().ok_or("too few words of memory")?;
     }
-    state.previous_duty = term("previous_duty")?;
-    state.previous_command = term("previous_command")?;
-    state.soft_cap = like.soft_cap.map(|_| term("soft_cap")).transpose()?;
-    for (name, coefficient) in ["a", "b", "c", "r"].into_iter().zip(&mut state.coefficients) {
-        *coefficient = term(&format!("mapping_{name}"))?;
+    for (path, own) in spec.policy.paths().iter().zip(&mut state.outputs) {
+        let term = |stem: &str| term(&path.named(stem));
+        own.previous_duty = term("previous_duty")?;
+        own.previous_command = term("previous_command")?;
+        own.soft_cap = own.soft_cap.map(|_| term("soft_cap")).transpose()?;
+        for (name, coefficient) in COEFFICIENTS.into_iter().zip(&mut own.coefficients) {
+            *coefficient = term(&format!("mapping_{name}"))?;
+        }
+        own.check = own.check.map(|_| term("mapping_check")).transpose()?;
     }
-    state.check = like.check.map(|_| term("mapping_check")).transpose()?;
     state.bad_count = term("bad_count")?;
     state.primed = term("primed")?;
     Ok(state)
@@ -163,31 +174,49 @@ pub(crate) fn measurement_record(spec: Spec<'_>, measurement: &[Term]) -> Value 
     Value::Record(members.collect())
 }
 
+/// Whether a command holds arrays: with several outputs it does.
+fn has_arrays(spec: Spec<'_>) -> bool {
+    matches!(spec.policy.head, Head::Several(_))
+}
+
 pub(crate) fn command_record(spec: Spec<'_>, command: &Command) -> Value {
     let float = Kind::Float(spec.float.format);
+    let of = |terms: &[Term], kind| match (has_arrays(spec), terms) {
+        (false, [one]) => value(*one, kind),
+        _ => Value::List(terms.iter().map(|term| value(*term, kind)).collect()),
+    };
     Value::Record(BTreeMap::from([
-        ("duty".to_owned(), value(command.duty, float)),
-        ("duty_sim".to_owned(), value(command.duty_sim, float)),
-        ("action_index".to_owned(), value(command.action_index, U32)),
+        ("duty".to_owned(), of(&command.duty, float)),
+        ("duty_sim".to_owned(), of(&command.duty_sim, float)),
+        ("action_index".to_owned(), of(&command.action_index, U32)),
         ("status".to_owned(), value(command.status, U32)),
     ]))
 }
 
-pub(crate) fn command_of(value: &Value) -> Result<Command, Wrong> {
+pub(crate) fn command_of(spec: Spec<'_>, value: &Value) -> Result<Command, Wrong> {
     let Value::Record(members) = value else {
         return Err("a command that is no record".into());
     };
-    let term = |name: &str| {
-        let member = members
-            .get(name)
-            .ok_or_else(|| format!("the command has no `{name}`"))?;
-        Ok::<Term, Wrong>(number(member)?.term)
+    let member = |name: &str| members.get(name).ok_or_else(|| format!("the command has no `{name}`"));
+    let count = spec.policy.paths().len();
+    let each = |name: &str| {
+        let terms = match has_arrays(spec) {
+            true => terms_of(member(name)?)?,
+            false => vec![number(member(name)?)?.term],
+        };
+        match terms.len() == count {
+            true => Ok::<Vec<Term>, Wrong>(terms),
+            false => Err(format!(
+                "`{name}` of the command has {} places for {count} outputs",
+                terms.len()
+            )),
+        }
     };
     Ok(Command {
-        duty: term("duty")?,
-        duty_sim: term("duty_sim")?,
-        action_index: term("action_index")?,
-        status: term("status")?,
+        duty: each("duty")?,
+        duty_sim: each("duty_sim")?,
+        action_index: each("action_index")?,
+        status: number(member("status")?)?.term,
     })
 }
 

@@ -1,38 +1,44 @@
 //! What the goals take for granted of rounded sums, and the goals that show it.
 
+use policy::DutyPath;
+
 use crate::goal::{Assumption, Goal, holds};
 use crate::smt::{Arithmetic, definitions, to_number};
-use crate::spec::{Spec, State};
+use crate::spec::{Own, Spec, State};
 use crate::term::Term;
 
-/// Facts about this policy's constants that uninterpreted sums do not know.
+/// Facts about this policy's constants that uninterpreted sums do not know, output by output.
 pub(crate) fn assumptions(spec: Spec<'_>, state: &State) -> Vec<Assumption> {
     let mut all = Vec::new();
-    if let Some(term) = slew_is_ordered(spec, state.previous_command) {
-        all.push(Assumption {
-            term,
-            text: "fl(previous_command - s) is not above fl(previous_command + s)".into(),
-        });
-    }
-    if let Some(term) = raised_is_number(spec, state) {
-        all.push(Assumption {
-            term,
-            text: "fl(soft_cap + inc) is a number if soft_cap is one between `from` and the upper limit".into(),
-        });
+    for (path, own) in spec.policy.paths().iter().zip(&state.outputs) {
+        if let Some(term) = slew_is_ordered(spec, path, own) {
+            let command = path.named("previous_command");
+            all.push(Assumption {
+                term,
+                text: format!("fl({command} - s) is not above fl({command} + s)"),
+            });
+        }
+        if let Some(term) = raised_is_number(spec, path, own) {
+            let cap = path.named("soft_cap");
+            all.push(Assumption {
+                term,
+                text: format!("fl({cap} + inc) is a number if {cap} is one between `from` and the upper limit"),
+            });
+        }
     }
     all
 }
 
 /// Where the lower end of the slew limit lay above the upper, the two clamps would not commute with the flag.
-fn slew_is_ordered(spec: Spec<'_>, previous: Term) -> Option<Term> {
-    let step = spec.slew_step()?;
+fn slew_is_ordered(spec: Spec<'_>, path: &DutyPath<'_>, own: &Own) -> Option<Term> {
+    let (step, previous) = (spec.slew_step(path.limits)?, own.previous_command);
     let (low, high) = (spec.float.sub(previous, step), spec.float.add(previous, step));
     Some(spec.terms.not(spec.float.gt(low, high)))
 }
 
-fn raised_is_number(spec: Spec<'_>, state: &State) -> Option<Term> {
-    let (cap, raise) = (state.soft_cap?, spec.soft_raise()?);
-    let (low, high) = spec.soft_range()?;
+fn raised_is_number(spec: Spec<'_>, path: &DutyPath<'_>, own: &Own) -> Option<Term> {
+    let (cap, raise) = (own.soft_cap?, spec.soft_raise(path.limits)?);
+    let (low, high) = spec.soft_range(path.limits)?;
     let raised = spec.float.add(cap, raise);
     let inside = spec.float.within(cap, low, high);
     Some(

@@ -1,11 +1,13 @@
 //! The goals of a policy: every function of the controller against the specification.
 
+use policy::DutyPath;
+
 use crate::emitted::{Called, Emitted};
 use crate::facts;
 use crate::goal::{Assumption, Goal, Pair, equal};
 use crate::machine::{Kind, U32};
 use crate::refusal::Refusal;
-use crate::spec::{self, Command, Sensed, Spec, State};
+use crate::spec::{self, Chosen, Command, Own, Sensed, Spec, State};
 use crate::term::Term;
 
 /// What a step is about: any state, any measurement, any command for `commit`.
@@ -42,10 +44,11 @@ impl Given {
 
 /// Of an output that is a NaN a curve by masks makes another number than section 7b. The check of a policy bounds every output
 /// over all sound states; of another state the command is the fallback, whatever the network says.
-fn numbers(spec: Spec<'_>, sensed: &Sensed, numbers: &[Term]) -> Option<Assumption> {
+fn numbers(spec: Spec<'_>, sensed: &Sensed, choices: &[Chosen]) -> Option<Assumption> {
     let (terms, float) = (spec.terms, spec.float);
-    let all: Vec<Term> = numbers.iter().map(|x| terms.not(float.is_nan(*x))).collect();
-    (!numbers.is_empty()).then(|| Assumption {
+    let numbers = choices.iter().flat_map(|choice| &choice.numbers);
+    let all: Vec<Term> = numbers.map(|x| terms.not(float.is_nan(*x))).collect();
+    (!all.is_empty()).then(|| Assumption {
         term: terms.or(terms.not(sensed.sound), terms.all(all)),
         text: "of a sound state the network's output, and the quotient of its curve, are numbers".into(),
     })
@@ -56,16 +59,11 @@ pub(crate) fn of(spec: Spec<'_>, emitted: &dyn Emitted) -> Result<Vec<Goal>, Ref
     let given = Given::new(spec);
     let mut goals = Vec::new();
     let evaluated = emitted.eval(&given.state, &given.measurement)?;
-    let choice = spec::choose(spec, emitted.to_cut()?, &evaluated.outputs);
-    let command = spec::decide(spec, &given.state, &given.sensed, &choice);
-    let of_head = given.with(numbers(spec, &given.sensed, &choice.numbers));
+    let choices = spec::choose(spec, emitted.to_cut()?, &evaluated.outputs);
+    let command = spec::decide(spec, &given.state, &given.sensed, &choices);
+    let of_head = given.with(numbers(spec, &given.sensed, &choices));
     eval(spec, emitted, &of_head, &evaluated, &command, &mut goals);
-    let any = Command {
-        duty: spec.terms.input("command_duty", spec.float.width()),
-        duty_sim: spec.terms.input("command_duty_sim", spec.float.width()),
-        action_index: spec.terms.input("index", 32),
-        status: spec.terms.input("word_status", 32),
-    };
+    let any = any_command(spec);
     let committed = emitted.commit(&given.state, &given.measurement, &any)?;
     commit(spec, emitted, &given, &committed, &any, &mut goals);
     let stepped = emitted.step(&given.state, &given.measurement)?;
@@ -87,6 +85,32 @@ pub(crate) fn of(spec: Spec<'_>, emitted: &dyn Emitted) -> Result<Vec<Goal>, Ref
         &given.assumptions,
     ));
     Ok(goals)
+}
+
+/// Whatever a caller may hand to `commit`.
+fn any_command(spec: Spec<'_>) -> Command {
+    let paths = spec.policy.paths();
+    let each = |stem: &str, width: u32| -> Vec<Term> {
+        let inputs = paths.iter().map(|path| spec.terms.input(&path.named(stem), width));
+        inputs.collect()
+    };
+    Command {
+        duty: each("command_duty", spec.float.width()),
+        duty_sim: each("command_duty_sim", spec.float.width()),
+        action_index: each("index", 32),
+        status: spec.terms.input("word_status", 32),
+    }
+}
+
+/// Of which output a goal is, behind a dot; nothing where there is one.
+fn of_output(path: &DutyPath<'_>) -> String {
+    path.name.map_or(String::new(), |name| format!(".{name}"))
+}
+
+/// The same in a sentence.
+fn whose(path: &DutyPath<'_>) -> String {
+    path.name
+        .map_or(String::new(), |name| format!(" of the output `{name}`"))
 }
 
 fn name(language: &str, part: &str) -> String {
@@ -144,21 +168,25 @@ fn eval(
     let text = "the network gets the observation of sections 2 to 5: held samples, filters, scales and clips";
     add("observation", text, &observed);
     if let Some(found) = &called.command {
-        let text = "`eval` commands the duty of sections 7 to 9: argmax, continuous head or gain schedule, mapping, slew limit, soft start, limits, fallback";
-        add("duty", text, &[pair("duty", found.duty, command.duty, float)]);
-        let text = "`eval` says the duty of the chosen action, or the fallback";
-        add(
-            "duty_sim",
-            text,
-            &[pair("duty_sim", found.duty_sim, command.duty_sim, float)],
-        );
-        let text = "`eval` says the lowest index of the largest Q value, and 0 with STATE";
-        add(
-            "action_index",
-            text,
-            &[pair("action_index", found.action_index, command.action_index, U32)],
-        );
-        let text = "`eval` sets exactly the status bits of section 9";
+        for (index, path) in spec.policy.paths().iter().enumerate() {
+            let (at, whose) = (of_output(path), whose(path));
+            let mut own = |stem: &str, text: &str, both: (&[Term], &[Term]), kind| {
+                let pair = pair(path.named(stem), both.0[index], both.1[index], kind);
+                add(&format!("{stem}{at}"), text, &[pair]);
+            };
+            let text = format!(
+                "`eval` commands the duty{whose} of sections 7 to 9: argmax, continuous head or gain schedule, mapping, slew limit, soft start, limits, fallback"
+            );
+            own("duty", &text, (&found.duty, &command.duty), float);
+            let text = format!("`eval` says the duty of the chosen action{whose}, or the fallback");
+            own("duty_sim", &text, (&found.duty_sim, &command.duty_sim), float);
+            let text = format!("`eval` says the lowest index of the largest Q value{whose}, and 0 with STATE");
+            own("action_index", &text, (&found.action_index, &command.action_index), U32);
+        }
+        let text = match spec.policy.paths().len() {
+            1 => "`eval` sets exactly the status bits of section 9",
+            _ => "`eval` sets exactly the status bits of section 9, of all outputs in one word",
+        };
         add("status", text, &[pair("status", found.status, command.status, U32)]);
     }
     add(
@@ -174,67 +202,83 @@ fn state_pairs(spec: Spec<'_>, emitted: &State, specified: &State) -> Vec<Pair> 
     groups.into_iter().flat_map(|(_, _, pairs)| pairs).collect()
 }
 
-type Group = (&'static str, &'static str, Vec<Pair>);
+/// Name, sentence and pairs of a part of the state.
+type Group = (String, String, Vec<Pair>);
 
 fn state_groups(spec: Spec<'_>, emitted: &State, specified: &State) -> Vec<Group> {
     let float = Kind::Float(spec.float.format);
     let memories = |state: &State| -> Vec<Term> { state.memory().copied().collect() };
-    let caps = emitted.soft_cap.zip(specified.soft_cap);
-    let all = [
-        (
+    let group = |name: &str, text: &str, pairs: Vec<Pair>| (name.to_owned(), text.to_owned(), pairs);
+    let mut all = vec![
+        group(
             "held",
             "the signals of this step",
             list("held", &emitted.held, &specified.held, float),
         ),
-        (
+        group(
             "memory",
             "the pushed words of every observer and filter, or +0",
             list("memory", &memories(emitted), &memories(specified), float),
         ),
-        (
-            "remembered",
-            "the duties of the command",
-            vec![
-                pair("previous_duty", emitted.previous_duty, specified.previous_duty, float),
-                pair(
-                    "previous_command",
-                    emitted.previous_command,
-                    specified.previous_command,
-                    float,
-                ),
-            ],
-        ),
-        (
-            "soft_cap",
-            "the raised cap, or its start",
-            caps.map(|(x, y)| pair("soft_cap", x, y, float)).into_iter().collect(),
-        ),
-        (
-            "coefficients",
-            "the coefficients and their check word as they are",
-            coefficients(spec, emitted, specified),
-        ),
-        (
-            "counters",
-            "the count of bad steps and `primed`",
-            vec![
-                pair("bad_count", emitted.bad_count, specified.bad_count, U32),
-                pair("primed", emitted.primed, specified.primed, U32),
-            ],
-        ),
     ];
+    let both = emitted.outputs.iter().zip(&specified.outputs);
+    for (path, (x, y)) in spec.policy.paths().iter().zip(both) {
+        all.extend(own_groups(spec, path, x, y));
+    }
+    all.push(group(
+        "counters",
+        "the count of bad steps and `primed`",
+        vec![
+            pair("bad_count", emitted.bad_count, specified.bad_count, U32),
+            pair("primed", emitted.primed, specified.primed, U32),
+        ],
+    ));
     all.into_iter().filter(|(_, _, pairs)| !pairs.is_empty()).collect()
 }
 
-fn coefficients(spec: Spec<'_>, emitted: &State, specified: &State) -> Vec<Pair> {
+/// What is remembered of one output.
+fn own_groups(spec: Spec<'_>, path: &DutyPath<'_>, emitted: &Own, specified: &Own) -> [Group; 3] {
+    let float = Kind::Float(spec.float.format);
+    let caps = emitted.soft_cap.zip(specified.soft_cap);
+    let group = |name: &str, text: &str, pairs: Vec<Pair>| {
+        let (at, whose) = (of_output(path), whose(path));
+        (format!("{name}{at}"), format!("{text}{whose}"), pairs)
+    };
+    let duties = [
+        ("previous_duty", emitted.previous_duty, specified.previous_duty),
+        ("previous_command", emitted.previous_command, specified.previous_command),
+    ];
+    [
+        group(
+            "remembered",
+            "the duties of the command",
+            duties.map(|(stem, x, y)| pair(path.named(stem), x, y, float)).into(),
+        ),
+        group(
+            "soft_cap",
+            "the raised cap, or its start",
+            caps.map(|(x, y)| pair(path.named("soft_cap"), x, y, float))
+                .into_iter()
+                .collect(),
+        ),
+        group(
+            "coefficients",
+            "the coefficients and their check word as they are",
+            coefficients(spec, path, emitted, specified),
+        ),
+    ]
+}
+
+fn coefficients(spec: Spec<'_>, path: &DutyPath<'_>, emitted: &Own, specified: &Own) -> Vec<Pair> {
     let float = Kind::Float(spec.float.format);
     let word = Kind::Integer {
         bits: spec.float.width(),
         signed: false,
     };
     let checks = emitted.check.zip(specified.check);
-    let mut pairs = list("coefficient", &emitted.coefficients, &specified.coefficients, float);
-    pairs.extend(checks.map(|(x, y)| pair("mapping_check", x, y, word)));
+    let label = path.named("coefficient");
+    let mut pairs = list(&label, &emitted.coefficients, &specified.coefficients, float);
+    pairs.extend(checks.map(|(x, y)| pair(path.named("mapping_check"), x, y, word)));
     pairs
 }
 
@@ -247,7 +291,7 @@ fn commit(
     goals: &mut Vec<Goal>,
 ) {
     let language = emitted.language();
-    let after = spec::commit(spec, &given.state, &given.sensed, command.duty, command.duty_sim);
+    let after = spec::commit(spec, &given.state, &given.sensed, command);
     for (part, text, pairs) in state_groups(spec, &called.state, &after) {
         let claim = format!("{language}: `commit` leaves what section 10 says: {text}");
         let name = name(language, &format!("commit.{part}"));
@@ -271,9 +315,9 @@ fn step(
         None => Vec::new(),
     };
     if let (Some(found), Some(command)) = (&called.command, &evaluated.command) {
-        pairs.push(pair("duty", found.duty, command.duty, float));
-        pairs.push(pair("duty_sim", found.duty_sim, command.duty_sim, float));
-        pairs.push(pair("action_index", found.action_index, command.action_index, U32));
+        pairs.extend(list("duty", &found.duty, &command.duty, float));
+        pairs.extend(list("duty_sim", &found.duty_sim, &command.duty_sim, float));
+        pairs.extend(list("action_index", &found.action_index, &command.action_index, U32));
         pairs.push(pair("status", found.status, command.status, U32));
         let after = emitted.commit(&given.state, &given.measurement, command)?;
         pairs.extend(state_pairs(spec, &called.state, &after.state));
@@ -314,24 +358,31 @@ fn around(
         "`reset` leaves the same, but keeps the coefficients and their check word",
         &pairs,
     );
-    if state.coefficients.is_empty() {
-        return Ok(());
+    for (index, path) in spec.policy.paths().iter().enumerate() {
+        let own = &state.outputs[index];
+        if own.coefficients.is_empty() {
+            continue;
+        }
+        let new = ["new_a", "new_b", "new_c", "new_r"].iter().zip(&own.coefficients);
+        let new: Vec<Term> = new
+            .map(|(name, _)| spec.terms.input(name, spec.float.width()))
+            .collect();
+        let (after, said) = emitted.set_mapping(path, state, &new)?;
+        let accepted = spec::accepted(spec, path, &new);
+        let mut specified = state.clone();
+        let changed = &mut specified.outputs[index];
+        for (old, new) in changed.coefficients.iter_mut().zip(&new) {
+            *old = spec.terms.choose(accepted, *new, *old);
+        }
+        let check = spec::check_word(spec, &new);
+        changed.check = own.check.map(|old| spec.terms.choose(accepted, check, old));
+        let mut pairs = state_pairs(spec, &after, &specified);
+        pairs.push(pair("accepted", said, spec.terms.number(accepted, 32), U32));
+        let text = format!(
+            "`{}` takes exactly the coefficients that section 8 accepts, writes their check word, and changes nothing else",
+            path.named("set_mapping")
+        );
+        add(&format!("set_mapping{}", of_output(path)), &text, &pairs);
     }
-    let new = ["new_a", "new_b", "new_c", "new_r"].iter().zip(&state.coefficients);
-    let new: Vec<Term> = new
-        .map(|(name, _)| spec.terms.input(name, spec.float.width()))
-        .collect();
-    let (after, said) = emitted.set_mapping(state, &new)?;
-    let accepted = spec::accepted(spec, &new);
-    let mut specified = state.clone();
-    for (old, new) in specified.coefficients.iter_mut().zip(&new) {
-        *old = spec.terms.choose(accepted, *new, *old);
-    }
-    let check = spec::check_word(spec, &new);
-    specified.check = state.check.map(|old| spec.terms.choose(accepted, check, old));
-    let mut pairs = state_pairs(spec, &after, &specified);
-    pairs.push(pair("accepted", said, spec.terms.number(accepted, 32), U32));
-    let text = "`set_mapping` takes exactly the coefficients that section 8 accepts, writes their check word, and changes nothing else";
-    add("set_mapping", text, &pairs);
     Ok(())
 }

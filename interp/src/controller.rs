@@ -233,6 +233,12 @@ impl<T: Real> Controller<T> {
         decides.then(|| self.head().decide(*outputs))
     }
 
+    /// [`Controller::decide`] of each of several outputs from its columns, in their order; `None` where there is one.
+    pub fn decide_each(&self, outputs: &ArrayView1<'_, T>) -> Option<Vec<(u32, T)>> {
+        let are_several = self.paths.len() > 1 && outputs.len() == self.outputs();
+        are_several.then(|| self.paths.iter().map(|path| path.decide(outputs)).collect())
+    }
+
     /// The gains that a gain schedule makes of a network's outputs (section 7c), as many as there are; `None` of any other head.
     pub fn gains(&self, outputs: &ArrayView1<'_, T>) -> Option<Vec<T>> {
         match self.head() {

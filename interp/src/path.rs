@@ -66,6 +66,12 @@ impl<T: Real> Path<T> {
         }
     }
 
+    /// Action index, and duty before the mapping, of all outputs of the network; nothing else is looked at, so not of a law.
+    pub fn decide(&self, outputs: &ArrayView1<'_, T>) -> (u32, T) {
+        self.head
+            .decide(outputs.slice_axis(Axis(0), self.columns.clone().into()))
+    }
+
     /// Action index and duty before the mapping.
     pub fn decided(&self, trace: &Trace<T>) -> (u32, T) {
         let outputs: ArrayView1<'_, T> = trace.q_values.slice_axis(Axis(0), self.columns.clone().into());

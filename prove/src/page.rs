@@ -150,6 +150,7 @@ fn provenance(answer: &Answer) -> Section {
             .iter()
             .map(|mapping| ("mapping, sha256", mapping.clone())),
     );
+    pairs.extend((!answer.outputs.is_empty()).then(|| ("outputs", answer.outputs.join(", "))));
     pairs.extend(tools.iter().map(|tool| ("tool", (*tool).to_owned())));
     Section::new("What it is about").pairs(pairs)
 }

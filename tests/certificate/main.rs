@@ -64,25 +64,33 @@ fn real_duty(head: &Continuous, y: f64) -> f64 {
     head.scale * s + head.offset
 }
 
-/// The same in the format.
-fn held_duty(controller: &Controller<f32>, y: f64) -> f64 {
-    let (_, duty) = controller.decide(&aview1(&[y as f32])).unwrap();
-    f64::from(duty)
+/// The same in the format: duties of all outputs.
+fn held_duties(controller: &Controller<f32>, held: &[f64]) -> Vec<f64> {
+    let outputs: Vec<f32> = held.iter().map(|y| *y as f32).collect();
+    let view = aview1(&outputs);
+    let one = || vec![controller.decide(&view).unwrap()];
+    let each = controller.decide_each(&view).unwrap_or_else(one);
+    each.into_iter().map(|(_, duty)| f64::from(duty)).collect()
 }
 
-/// What is bounded: errors of Q values, or of the duty.
+/// What is bounded, output by output: errors of Q values, or of the duty.
 fn errors(
     policy: &Policy,
     controller: &Controller<f32>,
     (held, real): (&[f64], &[f64]),
     rng: &mut SplitMix,
-) -> Vec<f64> {
-    match &policy.head {
-        Head::Choice(_) | Head::Residual(_) => held.iter().zip(real).map(|(held, real)| (held - real).abs()).collect(),
-        Head::Continuous(head) => vec![(held_duty(controller, held[0]) - real_duty(head, real[0])).abs()],
-        Head::Schedule(head) => vec![law_error(head, controller, (held, real), rng)],
-        Head::Several(_) => unreachable!("no policy of this test has several outputs"),
-    }
+) -> Vec<Vec<f64>> {
+    let of = |(index, path): (usize, policy::DutyPath<'_>)| {
+        let columns = path.columns();
+        match path.head {
+            Head::Continuous(head) => {
+                vec![(held_duties(controller, held)[index] - real_duty(head, real[path.column])).abs()]
+            }
+            Head::Schedule(head) => vec![law_error(head, controller, (held, real), rng)],
+            _ => columns.map(|column| (held[column] - real[column]).abs()).collect(),
+        }
+    };
+    policy.paths().into_iter().enumerate().map(of).collect()
 }
 
 /// Error of the law's duty at a base and factors that are drawn, most of them at an end of what they can be.
@@ -127,14 +135,18 @@ fn check(policy: &Policy, rng: &mut SplitMix, boxes: usize) -> (f64, usize) {
     let certifier = Certifier::new(policy);
     let controller = Controller::<f32>::new(policy);
     let domain = certifier.observations().clone();
-    let whole = certifier.box_bound();
+    let whole = certifier.box_bounds();
     let (mut nearest, mut decided) = (0.0_f64, 0);
     for _ in 0..boxes {
         let cell = cell(rng, &domain);
-        let bound = certifier.bound_over(&domain, &cell);
+        let bounds = certifier.bounds_over(&domain, &cell);
         let q_ranges = certifier.q_values_over(&domain, &cell);
-        let action = certifier.decided(&domain, &cell);
-        decided += usize::from(action.is_some());
+        let actions = certifier.decided(&domain, &cell);
+        decided += actions.iter().flatten().count();
+        assert_eq!(
+            (bounds.len(), actions.len()),
+            (policy.paths().len(), policy.paths().len())
+        );
         for _ in 0..12 {
             let point = point(rng, &cell);
             // the nearest binary32 may lie just outside of the box
@@ -145,29 +157,25 @@ fn check(policy: &Policy, rng: &mut SplitMix, boxes: usize) -> (f64, usize) {
             }
             let observation: Vec<f32> = point.iter().map(|x| *x as f32).collect();
             let (real, held) = (exact::q_values(policy, &observation), held(&controller, &observation));
-            let place = |n: usize| format!("{} {:?} {n} at {observation:?}", policy.name, policy.numeric_format);
-            for (n, range) in q_ranges.iter().enumerate() {
-                assert!(
-                    range.low <= real[n] && real[n] <= range.high,
-                    "{}: real Q outside",
-                    place(n)
-                );
+            let place = format!("{} {:?} at {observation:?}", policy.name, policy.numeric_format);
+            for (range, real) in q_ranges.iter().zip(&real) {
+                assert!(range.low <= *real && *real <= range.high, "{place}: real Q outside");
             }
-            for (n, error) in errors(policy, &controller, (&held, &real), rng).into_iter().enumerate() {
-                let place = place(n);
-                assert!(
-                    error <= bound.per_action[n],
-                    "{place}: {error} > {}",
-                    bound.per_action[n]
-                );
-                assert!(
-                    bound.per_action[n] <= whole.per_action[n] * 1.000_001,
-                    "{place}: a part beyond the whole"
-                );
-                nearest = nearest.max(error / bound.per_action[n]);
+            let errors = errors(policy, &controller, (&held, &real), rng);
+            for (output, errors) in errors.into_iter().enumerate() {
+                let (bound, whole) = (&bounds[output].per_action, &whole[output].per_action);
+                assert_eq!(errors.len(), bound.len(), "{place}");
+                for (n, error) in errors.into_iter().enumerate() {
+                    let place = format!("{place}: {n} of output {output}");
+                    assert!(error <= bound[n], "{place}: {error} > {}", bound[n]);
+                    assert!(bound[n] <= whole[n] * 1.000_001, "{place}: a part beyond the whole");
+                    nearest = nearest.max(error / bound[n]);
+                }
             }
-            if let Some(action) = action {
-                assert_eq!((argmax(&real), argmax(&held)), (action, action), "{}", policy.name);
+            for (path, action) in policy.paths().iter().zip(&actions) {
+                let Some(action) = action else { continue };
+                let own = |q: &[f64]| argmax(&q[path.columns()]);
+                assert_eq!((own(&real), own(&held)), (*action, *action), "{place}");
             }
         }
     }
@@ -202,6 +210,67 @@ fn random_policies_stay_within_their_bounds() {
     }
 }
 
+#[test]
+fn several_outputs_stay_within_the_bounds_of_each() {
+    let mut rng = SplitMix::new(5);
+    let (mut decided, mut drives) = (0, 0);
+    for seed in 700..720 {
+        let folder = tests::several::policy(seed).unwrap();
+        let policy = policy::load_with(&folder.path(), &tests::several::options()).unwrap();
+        drives += policy.paths().iter().filter(|path| !path.head.is_choice()).count();
+        for format in NumericFormat::ALL {
+            decided += check(&policy.clone().with_format(format), &mut rng, 10).1;
+        }
+    }
+    assert!(decided > 100 && drives > 10, "{decided} decisions, {drives} drives");
+}
+
+/// What is said of one output does not depend on the others: its bounds are those of a contract that has no others. Floats only,
+/// for in integers the scale of the last layer is that of all columns.
+#[test]
+fn an_output_among_several_has_the_bounds_that_it_has_alone() {
+    for seed in 720..730 {
+        let folder = tests::several::policy(seed).unwrap();
+        let policy = policy::load_with(&folder.path(), &tests::several::options()).unwrap();
+        let certifier = Certifier::new(&policy);
+        let bounds = certifier.box_bounds();
+        for (path, bound) in policy.paths().iter().zip(&bounds) {
+            let mut alone = policy.clone();
+            alone.head = path.head.clone();
+            let last = alone.layers.last_mut().unwrap();
+            let rows = path.columns();
+            last.weights = last.weights[rows.start * last.inputs..rows.end * last.inputs].to_vec();
+            last.bias = last.bias[rows.clone()].to_vec();
+            last.outputs = rows.len();
+            // the symbols of other outputs stand between, so that sums of magnitudes are made in another order
+            let alone = Certifier::new(&alone).box_bound();
+            for (alone, among) in alone.per_action.iter().zip(&bound.per_action) {
+                assert!(
+                    (alone - among).abs() <= 1e-12 * alone,
+                    "seed {seed}: {alone:e} {among:e}"
+                );
+            }
+            assert_eq!(alone.per_action.len(), bound.per_action.len(), "seed {seed}");
+        }
+        let states = Domain::of(&policy, Memory::Free);
+        let split = certifier.state_bounds(&states, 60);
+        let of_whole = certifier.bounds_over(&states, &states.whole());
+        assert!(
+            split
+                .iter()
+                .zip(&of_whole)
+                .all(|(split, whole)| split.bound.largest <= whole.largest)
+        );
+        assert!(
+            split
+                .iter()
+                .zip(&of_whole)
+                .any(|(split, whole)| split.bound.largest < whole.largest),
+            "seed {seed}: splitting tightens no output"
+        );
+    }
+}
+
 /// An output without weights: the rounding of its bias is all that is wrong with it.
 #[test]
 fn the_rounding_of_a_bias_is_in_the_bound() {
@@ -231,9 +300,10 @@ fn the_examples_features_come_in_pairs_of_opposite_sign() {
 #[test]
 fn the_observation_of_a_controller_lies_where_its_coordinates_say() {
     let mut rng = SplitMix::new(3);
-    for seed in 600..640 {
-        let folder = tests::random::policy(seed).unwrap();
-        let policy = policy::load(&folder.path()).unwrap();
+    let one = (600..640).map(|seed| tests::random::policy(seed).unwrap());
+    let several = (740..760).map(|seed| tests::several::policy(seed).unwrap());
+    for folder in one.chain(several) {
+        let policy = policy::load_with(&folder.path(), &tests::several::options()).unwrap();
         let certifier = Certifier::new(&policy);
         let domain = Domain::of(&policy, Memory::Free);
         let mut controller = Controller::<f32>::new(&policy);
@@ -251,10 +321,16 @@ fn the_observation_of_a_controller_lies_where_its_coordinates_say() {
                 .map(|(signal, value)| verify::traces::sample_of(policy::Scalar::F32, signal, *value))
                 .collect();
             let state = controller.state();
-            let duties = [
-                ("previous_duty".to_owned(), f64::from(state.previous_duty)),
-                ("previous_command".to_owned(), f64::from(state.previous_command)),
-            ];
+            let paths = policy.paths();
+            let duties = paths.iter().enumerate().flat_map(|(index, path)| {
+                let own = state.output(index);
+                let called = |word: &str| path.name.map_or(word.to_owned(), |name| format!("{name}_{word}"));
+                [
+                    (called("previous_duty"), f64::from(own.previous_duty)),
+                    (called("previous_command"), f64::from(own.previous_command)),
+                ]
+            });
+            let duties: Vec<(String, f64)> = duties.collect();
             let trace = controller.step(&samples).unwrap();
             let signals = policy.signals.iter().zip(&trace.signals);
             let signals = signals.map(|(signal, x)| (signal.name.clone(), f64::from(*x)));

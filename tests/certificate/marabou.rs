@@ -114,7 +114,7 @@ fn score(policy: &Policy, certifier: &Certifier, boxes: usize) -> Score {
             let near = end - 0.1 * (high - low);
             score.tight += usize::from(marabou.find(&cell, &[(n, factor)], near).is_some());
         }
-        let Some(action) = certifier.decided(&domain, &cell) else {
+        let [Some(action)] = certifier.decided(&domain, &cell)[..] else {
             continue;
         };
         score.decided += 1;

@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use super::certify::two_outputs;
 use super::{Desk, run};
 
 /// Without provers on the path nothing is proved, which is said, and is no failure of the policy.
@@ -25,6 +26,29 @@ fn provers_that_are_missing_are_named_with_the_command_that_installs_them() {
     let goal = desk.read("proof/f32-c.duty.smt2");
     assert!(goal.contains("(check-sat)"), "{goal}");
     assert!(desk.path("proof/proof.html").exists());
+}
+
+#[test]
+fn several_outputs_are_named_and_have_goals_of_their_own() {
+    let desk = two_outputs();
+    let empty = desk.path("empty");
+    std::fs::create_dir(&empty).unwrap();
+    let mut command = desk.command();
+    command
+        .args("prove policy --format f32-fma --out proof --goals".split(' '))
+        .env("PATH", &empty);
+    let ran = run(&mut command);
+    assert_eq!(ran.code, Some(0), "{}{}", ran.stdout, ran.stderr);
+    let proof: Value = serde_json::from_str(&desk.read("proof/proof.json")).unwrap();
+    assert_eq!(proof.pointer("/outputs"), Some(&serde_json::json!(["left", "right"])));
+    for goal in [
+        "c.duty.left",
+        "eva.duty_sim.right",
+        "rust.action_index.left",
+        "c.status",
+    ] {
+        assert!(desk.path(&format!("proof/f32-fma-{goal}.smt2")).exists(), "{goal}");
+    }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod defects;
+mod several;
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -100,7 +101,8 @@ fn assert_proved(policy: &Policy, solver: &Solver) {
 }
 
 fn load(path: &str) -> Policy {
-    policy::load(&tests::root().join(path).join("policy.toml")).unwrap_or_else(|faults| panic!("{faults}"))
+    let path = tests::root().join(path).join("policy.toml");
+    policy::load_with(&path, &tests::several::options()).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
 #[test]

@@ -65,20 +65,44 @@ const DEFECTS: [Defect; 28] = [
 /// What a plain run tries: half of the drivers, a few seconds each.
 const PLAIN: usize = 4;
 
+/// Those of several outputs; a plain run takes the first two.
+#[rustfmt::skip]
+const OF_SEVERAL: [Defect; 9] = [
+    defect("columns beyond those of the network", ("legs_greedy(&outputs[1], 2u)", "legs_greedy(&outputs[2], 2u)"), "prove_step", "step-runs"),
+    defect("one output without its fallback", ("legs_select(usable, v37, 0.0f)", "v37"), "prove_marked", "marked-marked"),
+    defect("soft caps exchanged", ("state->soft_cap_left = v3;", "state->soft_cap_left = v7;"), "prove_step", "step-state"),
+    defect("fallback of the other output", ("legs_select(usable, v20, 0.25f)", "legs_select(usable, v20, 0.0f)"), "prove_damaged", "damaged-duty.left"),
+    defect("limits of the other output", ("legs_clamp(v19, 0.2f, 0.79999995f)", "legs_clamp(v19, 0.1f, 0.9f)"), "prove_damaged", "damaged-duty.left"),
+    defect("a place behind the command", ("command->duty[1] =", "command->duty[2] ="), "prove_step", "step-runs"),
+    defect("an index of the wrong table", ("command->action_index[0] = 0u", "command->action_index[0] = index1"), "prove_damaged", "damaged-action.left"),
+    defect("start of the other output", ("state->soft_cap_left = 0.2f", "state->soft_cap_left = 0.1f"), "prove_others", "others-reset"),
+    defect("an answer of one mapping that there is not", ("        state->mapping_check_right = 0x4B4B4B4Bu ^ legs_bits(a) ^ legs_bits(b) ^ legs_bits(c);\n    }\n    return accepted;", "    }\n    return accepted + 1u;"), "prove_others", "others-mapping.right"),
+];
+
 #[test]
 fn no_planted_defect_is_proved() {
-    let policy = in_format("tests/golden/cases/constructs", NumericFormat::F32);
-    let good = sources(&policy);
     let count = if tests::full() { DEFECTS.len() } else { PLAIN };
+    plant("tests/golden/cases/constructs", &DEFECTS[..count]);
+}
+
+#[test]
+fn no_planted_defect_of_several_outputs_is_proved() {
+    let count = if tests::full() { OF_SEVERAL.len() } else { 2 };
+    plant("tests/fixtures/legs", &OF_SEVERAL[..count]);
+}
+
+fn plant(path: &str, defects: &[Defect]) {
+    let policy = in_format(path, NumericFormat::F32);
+    let good = sources(&policy);
     for Defect {
         what,
         edit,
         driver,
         claim,
-    } in &DEFECTS[..count]
+    } in defects
     {
         let mut files = good.clone();
-        let text = files.get_mut("constructs.c").unwrap();
+        let text = files.get_mut(&format!("{}.c", policy.name)).unwrap();
         assert_eq!(text.matches(edit.0).count(), 1, "{what}: `{}`", edit.0);
         *text = text.replace(edit.0, edit.1);
         let claims = watched(|watch| eva::prove_sources(task(&policy), &files, Some(driver), watch)).unwrap();

@@ -7,10 +7,11 @@ use std::collections::BTreeMap;
 
 use codegen::Output;
 use policy::{NumericFormat, Policy};
-use prove::{Claim, Eva, Prover, Stop, Task, Verdict, Watch};
+use prove::{Answer, Claim, Eva, Prover, Stop, Task, Verdict, Watch, eva};
 
 fn load(path: &str) -> Policy {
-    policy::load(&tests::root().join(path).join("policy.toml")).unwrap_or_else(|faults| panic!("{faults}"))
+    let path = tests::root().join(path).join("policy.toml");
+    policy::load_with(&path, &tests::several::options()).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
 fn in_format(path: &str, format: NumericFormat) -> Policy {
@@ -63,6 +64,57 @@ fn assert_proved(policy: &Policy) {
 fn nothing_goes_wrong_in_a_small_controller() {
     assert_proved(&load("tests/golden/cases/minimal"));
     assert_proved(&in_format("tests/golden/cases/minimal", NumericFormat::I16));
+}
+
+#[test]
+fn nothing_goes_wrong_in_a_controller_with_two_outputs() {
+    let formats = [
+        NumericFormat::I16,
+        NumericFormat::F32,
+        NumericFormat::F64,
+        NumericFormat::I8,
+    ];
+    let count = if tests::full() { formats.len() } else { 1 };
+    for format in &formats[..count] {
+        assert_proved(&in_format("tests/fixtures/legs", *format));
+    }
+}
+
+#[test]
+fn claims_name_the_outputs() {
+    let policy = load("tests/fixtures/legs");
+    let claims =
+        watched(|watch| eva::prove_sources(task(&policy), &sources(&policy), Some("prove_step"), watch)).unwrap();
+    let names: Vec<&str> = claims.iter().map(|claim| claim.name.as_str()).collect();
+    for name in [
+        "step-duty.left",
+        "step-duty.right",
+        "step-chosen.left",
+        "step-action.right",
+        "step-status",
+    ] {
+        assert!(names.contains(&name), "{name} in {names:?}");
+    }
+    let answer = Answer::new(&[task(&policy)], claims);
+    assert_eq!(answer.outputs, ["left", "right"]);
+    assert!(prove::page::page(&answer).unwrap().contains("left, right"));
+}
+
+#[test]
+fn nothing_goes_wrong_in_random_policies_with_several_outputs() {
+    // a minute each where others build
+    let count = if tests::full() { 20 } else { 0 };
+    for seed in 4300..4300 + count {
+        let folder = tests::several::policy(seed).unwrap();
+        let policy = policy::load_with(&folder.path(), &tests::several::options()).unwrap();
+        let formats = [
+            NumericFormat::F32,
+            NumericFormat::I16,
+            NumericFormat::F64,
+            NumericFormat::I8,
+        ];
+        assert_proved(&policy.with_format(formats[(seed % 4) as usize]));
+    }
 }
 
 #[test]

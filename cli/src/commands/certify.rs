@@ -37,7 +37,7 @@ pub struct Request {
 pub struct Made {
     /// As `certificate.json` has it.
     pub certificate: Certificate,
-    /// `certificate.json`, `certificate.html` and, where there is a map, `map.svg`.
+    /// `certificate.json`, `certificate.html` and, where there is a map, `map.svg`: of the output `left` `map-left.svg`.
     pub files: BTreeMap<String, String>,
     /// What the command says.
     pub summary: String,
@@ -55,7 +55,7 @@ struct Answer<'a> {
 
 /// Proves, measures, draws, writes.
 pub fn run(options: &Certify) -> Result<Outcome, Failure> {
-    let policy = super::load_as(&options.policy, options.outside, options.format)?;
+    let policy = super::load_several_as(&options.policy, options.outside, options.format)?;
     let working = Working::new("bounding and drawing states");
     let mut made = make(
         &policy,
@@ -99,22 +99,17 @@ pub fn make(policy: &Policy, options: &Request) -> Result<Made, Failure> {
         let message = message.found("f64").expected("one of f32, f32-fma, i16, i8");
         return Err(message.hint("--format f32").into());
     }
-    let is_actor = !policy.head.is_choice();
-    if is_actor && !(options.axis.is_empty() && options.at.is_empty()) {
+    let decides = policy.paths().iter().any(|path| path.head.is_choice());
+    let asks_for_a_map = !(options.axis.is_empty() && options.at.is_empty());
+    if asks_for_a_map && !decides {
         let message = Message::new("a map shows where actions are proven, and this policy commands a number");
         return Err(message.found("--axis or --at").hint("leave them out").into());
     }
-    let slice = if is_actor { None } else { slice(policy, options)? };
+    let slice = if decides { slice(policy, options)? } else { None };
     let controller = Controller::<f32>::new(policy);
-    let q_values = |observation: &[f32]| match controller.q_values(&aview1(observation)) {
-        Ok(outputs) if is_actor => {
-            let gains = controller.gains(&outputs.view());
-            let duty = || controller.decide(&outputs.view()).map(|(_, duty)| vec![duty]);
-            let numbers = gains.or_else(duty).unwrap_or_default();
-            numbers.into_iter().map(f64::from).collect()
-        }
-        Ok(q_values) => q_values.iter().map(|q| f64::from(*q)).collect(),
-        Err(_) => Vec::new(),
+    let q_values = |observation: &[f32]| {
+        let numbers = answers(policy, &controller, observation).unwrap_or_default();
+        numbers.into_iter().map(f64::from).collect()
     };
     let mut rng = SplitMix::new(options.seed);
     let effort = Effort {
@@ -125,22 +120,52 @@ pub fn make(policy: &Policy, options: &Request) -> Result<Made, Failure> {
     let certificate = Certificate::new(policy, effort, slice.as_ref(), &q_values, &mut || rng.unit());
     let mut json = serde_json::to_string_pretty(&certificate)?;
     json.push('\n');
-    let map = page::map(policy, &certificate)?;
+    let maps = page::maps(policy, &certificate)?;
     let mut files = BTreeMap::from([
         ("certificate.json".to_owned(), json),
         (
             "certificate.html".to_owned(),
-            page::page(policy, &certificate, map.clone())?,
+            page::page(policy, &certificate, maps.clone())?,
         ),
     ]);
-    if let Some(map) = map {
-        files.insert("map.svg".to_owned(), map.to_string());
+    for (statement, map) in certificate.statements.iter().zip(maps) {
+        let Some(map) = map else { continue };
+        let output = statement.output.as_ref();
+        let name = output.map_or("map.svg".to_owned(), |output| format!("map-{output}.svg"));
+        files.insert(name, map.to_string());
     }
     Ok(Made {
         files,
         summary: page::summary(&certificate),
         certificate,
     })
+}
+
+/// What the format says at an observation, output by output: Q values, the duty of an actor, or the gains of a law.
+fn answers(policy: &Policy, controller: &Controller<f32>, observation: &[f32]) -> Option<Vec<f32>> {
+    let outputs = controller.q_values(&aview1(observation)).ok()?;
+    let paths = policy.paths();
+    let view = outputs.view();
+    let Some(decisions) = controller.decide_each(&view) else {
+        if policy.head.is_choice() {
+            return Some(outputs.to_vec());
+        }
+        let duty = || controller.decide(&view).map(|(_, duty)| vec![duty]);
+        return controller.gains(&view).or_else(duty);
+    };
+    let each = paths
+        .iter()
+        .zip(decisions)
+        .flat_map(|(path, (_, duty))| match path.head.is_choice() {
+            true => outputs
+                .iter()
+                .copied()
+                .skip(path.column)
+                .take(path.head.outputs())
+                .collect(),
+            false => vec![duty],
+        });
+    Some(each.collect())
 }
 
 /// The slice that is asked for, of settled states unless those have fewer than two coordinates; `None` if all have.

@@ -19,7 +19,7 @@ use crate::talk;
 pub fn run(options: &Prove) -> Result<Outcome, Failure> {
     let stop = interruption::stop_on_signal();
     let target = codegen::target(&options.target)?;
-    let policy = super::load(&options.policy, options.outside)?;
+    let policy = super::load_several_as(&options.policy, options.outside, None)?;
     let policies = match options.format.as_slice() {
         [] => vec![policy],
         formats => formats

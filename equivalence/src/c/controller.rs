@@ -1,5 +1,7 @@
 //! The functions of the emitted C as [`Emitted`].
 
+use policy::DutyPath;
+
 use super::execute::{Outside, Walk};
 use super::unit::Unit;
 use crate::Reading;
@@ -121,12 +123,12 @@ impl<'a> C<'a> {
         let command = match answers {
             true => {
                 let command = machine.read(&places.command).map_err(refused)?;
-                Some(command_of(&command).map_err(refused)?)
+                Some(command_of(self.spec, &command).map_err(refused)?)
             }
             false => None,
         };
         let called = Called {
-            state: state_of(&after, state).map_err(refused)?,
+            state: state_of(self.spec, &after, state).map_err(refused)?,
             command,
             obligations: machine.obligations,
             observations: network.observations,
@@ -236,7 +238,7 @@ impl Emitted for C<'_> {
         Ok(self.run("reset", state, &[], None, state_alone, false)?.0.state)
     }
 
-    fn set_mapping(&self, state: &State, coefficients: &[Term]) -> Result<(State, Term), Refusal> {
+    fn set_mapping(&self, path: &DutyPath<'_>, state: &State, coefficients: &[Term]) -> Result<(State, Term), Refusal> {
         let kind = Kind::Float(self.spec.float.format);
         let arguments = |places: &Places| {
             let numbers = coefficients
@@ -244,10 +246,11 @@ impl Emitted for C<'_> {
                 .map(|term| Value::Number(Number { term: *term, kind }));
             state_alone(places).into_iter().chain(numbers).collect()
         };
-        let (called, returned) = self.run("set_mapping", state, &[], None, arguments, false)?;
+        let name = path.named("set_mapping");
+        let (called, returned) = self.run(&name, state, &[], None, arguments, false)?;
         match returned {
             Some(Value::Number(Number { term, kind: U32 })) => Ok((called.state, term)),
-            _ => Err(self.refused("`set_mapping` gives no uint32_t".into())),
+            _ => Err(self.refused(format!("`{name}` gives no uint32_t"))),
         }
     }
 

@@ -15,13 +15,16 @@ use crate::refusal::Refusal;
 
 /// The macros under which a reader sees the code. A compiler knows the extensions of GNU, but no vectors and no assembly of a core.
 pub(crate) fn defined(reading: Reading, policy: &policy::Policy) -> Vec<(String, &'static str)> {
-    match reading {
+    let mut all = match reading {
         Reading::Compiler => vec![("__GNUC__".to_owned(), "12")],
         Reading::FramaC => {
             let portable = format!("{}_PORTABLE", policy.name.to_uppercase());
             vec![("__FRAMAC__".to_owned(), "1"), (portable, "1")]
         }
-    }
+    };
+    // the preprocessor of either says that `double` is binary64, which a fused sum in C asks for
+    all.push(("__DBL_MANT_DIG__".to_owned(), "53"));
+    all
 }
 
 const SCALARS: [(&str, machine::Kind); 11] = [

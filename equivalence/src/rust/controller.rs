@@ -1,5 +1,7 @@
 //! The functions of the emitted Rust as [`Emitted`].
 
+use policy::DutyPath;
+
 use super::execute::Walk;
 use super::unit::Unit;
 use crate::emitted::{
@@ -53,7 +55,9 @@ impl<'a> Rust<'a> {
         arguments.extend(numbers);
         let given = walk.call(&format!("Self::{method}"), arguments)?;
         let machine = walk.machine;
-        let after = machine.read(&place).and_then(|after| state_of(&after, state));
+        let after = machine
+            .read(&place)
+            .and_then(|after| state_of(self.spec, &after, state));
         let called = Called {
             state: after.map_err(|message| self.refused(message))?,
             command: None,
@@ -71,7 +75,7 @@ impl<'a> Rust<'a> {
     fn commanded(&self, method: &str, state: &State, measurement: &[Term]) -> Result<Called, Refusal> {
         let (mut called, given) = self.run(method, state, vec![self.measured(measurement)?], Vec::new())?;
         let command = self.checked("Command", given)?;
-        called.command = Some(command_of(&command).map_err(|message| self.refused(message))?);
+        called.command = Some(command_of(self.spec, &command).map_err(|message| self.refused(message))?);
         Ok(called)
     }
 }
@@ -111,25 +115,26 @@ impl Emitted for Rust<'_> {
         let mut walk = Walk::new(&self.unit, &mut network);
         let given = walk.call("Self::new", Vec::new())?;
         let given = self.checked("Controller", given)?;
-        state_of(&given, state).map_err(|message| self.refused(message))
+        state_of(self.spec, &given, state).map_err(|message| self.refused(message))
     }
 
     fn reset(&self, state: &State) -> Result<State, Refusal> {
         Ok(self.run("reset", state, Vec::new(), Vec::new())?.0.state)
     }
 
-    fn set_mapping(&self, state: &State, coefficients: &[Term]) -> Result<(State, Term), Refusal> {
+    fn set_mapping(&self, path: &DutyPath<'_>, state: &State, coefficients: &[Term]) -> Result<(State, Term), Refusal> {
         let kind = Kind::Float(self.spec.float.format);
         let numbers = coefficients
             .iter()
             .map(|term| Value::Number(Number { term: *term, kind }));
-        let (called, given) = self.run("set_mapping", state, Vec::new(), numbers.collect())?;
+        let name = path.named("set_mapping");
+        let (called, given) = self.run(&name, state, Vec::new(), numbers.collect())?;
         match number(&given) {
             Ok(Number {
                 term,
                 kind: Kind::Truth,
             }) => Ok((called.state, self.spec.terms.number(term, 32))),
-            _ => Err(self.refused("`set_mapping` gives no bool".into())),
+            _ => Err(self.refused(format!("`{name}` gives no bool"))),
         }
     }
 

@@ -243,6 +243,7 @@ impl<'a, 'u> Walk<'a, 'u> {
     fn indexed(&mut self, expr: &Expr, index: &syn::ExprIndex) -> Result<Value, Fault> {
         let at_index = self.number(&index.index, Some(U64))?;
         let list = self.place(&index.expr)?;
+        let list = self.dereferenced(list).map_err(|message| at(expr, message))?;
         let list = self.machine.read(&list).map_err(|message| at(expr, message))?;
         self.machine
             .element(&list, at_index)

@@ -11,11 +11,11 @@ mod sense;
 mod state;
 pub(crate) mod tables;
 
-pub(crate) use decide::{Command, choose, commit, decide};
+pub(crate) use decide::{Chosen, Command, choose, commit, decide};
 pub(crate) use sense::{Sensed, measurement, sense};
-pub(crate) use state::{State, accepted, check_word, initial, reset};
+pub(crate) use state::{Own, State, accepted, check_word, initial, reset};
 
-use policy::{Interval, Policy, Scalar};
+use policy::{Interval, Limits, Policy, Scalar};
 
 use crate::float::Float;
 use crate::term::{Term, Terms};
@@ -72,22 +72,21 @@ impl<'a> Spec<'a> {
     }
 
     /// The largest change of duty, rounded down (section 9).
-    pub(crate) fn slew_step(self) -> Option<Term> {
-        let slew = self.policy.limits.slew?;
+    pub(crate) fn slew_step(self, limits: &Limits) -> Option<Term> {
+        let slew = limits.slew?;
         Some(self.float.constant(self.format().down(slew)))
     }
 
     /// By how much the soft cap rises: `(max - from)/steps` in binary64 (section 10).
-    pub(crate) fn soft_raise(self) -> Option<Term> {
-        let limits = &self.policy.limits;
+    pub(crate) fn soft_raise(self, limits: &Limits) -> Option<Term> {
         let start = limits.soft_start?;
         Some(self.nearest((limits.duty.high - start.from) / f64::from(start.steps)))
     }
 
     /// Where a sound soft cap lies (section 1).
-    pub(crate) fn soft_range(self) -> Option<(Term, Term)> {
-        let start = self.policy.limits.soft_start?;
-        let (_, high) = self.inwards(self.policy.limits.duty);
+    pub(crate) fn soft_range(self, limits: &Limits) -> Option<(Term, Term)> {
+        let start = limits.soft_start?;
+        let (_, high) = self.inwards(limits.duty);
         Some((self.nearest(start.from), high))
     }
 

@@ -166,10 +166,10 @@ fn source(spec: Spec<'_>, expr: &Expr, state: &State, signals: &[Term], estimate
     let of = |x: &Expr| source(spec, x, state, signals, estimates);
     match expr {
         Expr::Input(Input::Signal(index)) => signals[*index],
-        Expr::Input(Input::PreviousDuty) => state.previous_duty,
-        Expr::Input(Input::PreviousCommand) => state.previous_command,
-        // a specification is of one output: contracts with several are refused when they are read
-        Expr::Input(Input::OutputDuty(_) | Input::OutputCommand(_)) => state.previous_duty,
+        Expr::Input(Input::PreviousDuty) => state.outputs[0].previous_duty,
+        Expr::Input(Input::PreviousCommand) => state.outputs[0].previous_command,
+        Expr::Input(Input::OutputDuty(index)) => state.outputs[*index].previous_duty,
+        Expr::Input(Input::OutputCommand(index)) => state.outputs[*index].previous_command,
         Expr::Input(Input::Estimate(index, estimate)) => {
             let [current, voltage, bias, surplus] = estimates[*index];
             match estimate {

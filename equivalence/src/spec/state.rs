@@ -1,6 +1,6 @@
 //! Section 1: the state, which states are sound, and what `init` and `reset` leave. Section 8: coefficients set at run time.
 
-use policy::{Activation, Expr, Feature, Filter, Head, Input, Mapping, Squash, memory_bounds};
+use policy::{Activation, DutyPath, Expr, Feature, Filter, Head, Input, Mapping, Squash, memory_bounds};
 
 use super::Spec;
 use crate::term::Term;
@@ -13,6 +13,15 @@ pub(crate) struct State {
     pub observers: Vec<Vec<Term>>,
     /// By feature, then filter, then word: oldest first.
     pub memories: Vec<Vec<Vec<Term>>>,
+    /// By output (section 9b); a contract with one has one of these.
+    pub outputs: Vec<Own>,
+    pub bad_count: Term,
+    pub primed: Term,
+}
+
+/// What is remembered of one output.
+#[derive(Clone)]
+pub(crate) struct Own {
     pub previous_duty: Term,
     pub previous_command: Term,
     pub soft_cap: Option<Term>,
@@ -20,8 +29,6 @@ pub(crate) struct State {
     pub coefficients: Vec<Term>,
     /// Their check word, as wide as the format; none without a mapping.
     pub check: Option<Term>,
-    pub bad_count: Term,
-    pub primed: Term,
 }
 
 impl State {
@@ -45,14 +52,7 @@ impl State {
                 .collect(),
             observers: observers.collect(),
             memories: memories.collect(),
-            previous_duty: number("previous_duty"),
-            previous_command: number("previous_command"),
-            soft_cap: spec.policy.limits.soft_start.map(|_| number("soft_cap")),
-            coefficients: coefficients(spec)
-                .iter()
-                .map(|(name, _, _)| number(&format!("mapping_{name}")))
-                .collect(),
-            check: (spec.policy.mapping.is_some()).then(|| spec.terms.input("word_mapping_check", spec.float.width())),
+            outputs: spec.policy.paths().iter().map(|path| Own::any(spec, path)).collect(),
             bad_count: spec.terms.input("bad_count", 32),
             primed: spec.terms.input("primed", 32),
         }
@@ -89,36 +89,82 @@ impl State {
         for (word, bound) in self.memory().zip(memory_bounds(spec.policy)) {
             all.push(float.within(*word, spec.nearest(-bound), spec.nearest(bound)));
         }
-        let limits = &spec.policy.limits;
-        let start = [limits.initial_duty, spec.policy.fallback.duty].map(|duty| spec.format().nearest(duty));
-        if reads(spec, Input::PreviousDuty) {
-            all.push(between(spec, self.previous_duty, duties(spec).into_iter().chain(start)));
+        for (own, path) in self.outputs.iter().zip(spec.policy.paths()) {
+            own.sound(spec, &path, &mut all);
         }
-        let range = [spec.format().up(limits.duty.low), spec.format().down(limits.duty.high)];
-        if reads(spec, Input::PreviousCommand) || limits.slew.is_some() {
-            all.push(between(spec, self.previous_command, range.into_iter().chain(start)));
-        }
-        if let Some((cap, (low, high))) = self.soft_cap.zip(spec.soft_range()) {
-            all.push(float.within(cap, low, high));
-        }
-        all.extend(
-            self.check
-                .map(|check| terms.equal(check, check_word(spec, &self.coefficients))),
-        );
         all.push(terms.order("bvule", self.bad_count, spec.counter(spec.hold() + 1)));
         all.push(terms.order("bvule", self.primed, spec.counter(1)));
         terms.all(all)
     }
 }
 
+impl Own {
+    fn any(spec: Spec<'_>, path: &DutyPath<'_>) -> Self {
+        let number = |stem: &str| spec.terms.input(&path.named(stem), spec.float.width());
+        let check = path.named("word_mapping_check");
+        Own {
+            previous_duty: number("previous_duty"),
+            previous_command: number("previous_command"),
+            soft_cap: path.limits.soft_start.map(|_| number("soft_cap")),
+            coefficients: coefficients(path.mapping)
+                .iter()
+                .map(|(name, _, _)| number(&format!("mapping_{name}")))
+                .collect(),
+            check: (path.mapping.is_some()).then(|| spec.terms.input(&check, spec.float.width())),
+        }
+    }
+
+    /// What has to hold of a sound state (section 1), of one output those of section 9b.
+    fn sound(&self, spec: Spec<'_>, path: &DutyPath<'_>, all: &mut Vec<Term>) {
+        let (terms, float, limits) = (spec.terms, spec.float, path.limits);
+        let start = [limits.initial_duty, path.fallback].map(|duty| spec.format().nearest(duty));
+        if reads(spec, path.previous_duty) {
+            let duties = duties(spec, path).into_iter().chain(start);
+            all.push(between(spec, self.previous_duty, duties));
+        }
+        let range = [spec.format().up(limits.duty.low), spec.format().down(limits.duty.high)];
+        if reads(spec, path.previous_command) || limits.slew.is_some() {
+            all.push(between(spec, self.previous_command, range.into_iter().chain(start)));
+        }
+        if let Some((cap, (low, high))) = self.soft_cap.zip(spec.soft_range(limits)) {
+            all.push(float.within(cap, low, high));
+        }
+        all.extend(
+            self.check
+                .map(|check| terms.equal(check, check_word(spec, &self.coefficients))),
+        );
+    }
+
+    /// After `reset`, which keeps the coefficients and their check word.
+    fn reset(&self, spec: Spec<'_>, path: &DutyPath<'_>) -> Self {
+        Own {
+            previous_duty: spec.nearest(path.limits.initial_duty),
+            previous_command: spec.nearest(path.limits.initial_duty),
+            soft_cap: path.limits.soft_start.map(|start| spec.nearest(start.from)),
+            ..self.clone()
+        }
+    }
+
+    /// After `init`: the coefficients are those of the file.
+    fn initial(&self, spec: Spec<'_>, path: &DutyPath<'_>) -> Self {
+        let coefficients = coefficients(path.mapping);
+        let coefficients: Vec<Term> = coefficients.iter().map(|(_, value, _)| spec.nearest(*value)).collect();
+        Own {
+            check: self.check.map(|_| check_word(spec, &coefficients)),
+            coefficients,
+            ..self.reset(spec, path)
+        }
+    }
+}
+
 /// The duties of all actions, those of a continuous head at both ends of its squash (section 7b), or the
 /// limits of a law (sections 7c and 8).
-fn duties(spec: Spec<'_>) -> Vec<f64> {
+fn duties(spec: Spec<'_>, path: &DutyPath<'_>) -> Vec<f64> {
     let format = spec.format();
-    match &spec.policy.head {
+    match path.head {
         Head::Choice(actions) => actions.iter().map(|action| format.nearest(action.duty)).collect(),
         Head::Residual(_) | Head::Schedule(_) => {
-            let limits = spec.policy.limits.duty;
+            let limits = path.limits.duty;
             vec![format.up(limits.low), format.down(limits.high)]
         }
         Head::Continuous(head) => {
@@ -134,7 +180,7 @@ fn duties(spec: Spec<'_>) -> Vec<f64> {
             })
             .to_vec()
         }
-        // a specification is of one output: contracts with several are refused when they are read
+        // each of several is a path with a head of its own
         Head::Several(_) => Vec::new(),
     }
 }
@@ -177,9 +223,9 @@ fn reads(spec: Spec<'_>, input: Input) -> bool {
     observed || features.iter().any(|feature| in_tree(&feature.source, input))
 }
 
-/// Name, value and allowed interval of every coefficient of the mapping; nothing without one.
-fn coefficients(spec: Spec<'_>) -> Vec<(&'static str, f64, policy::Interval)> {
-    let Some(mapping) = &spec.policy.mapping else {
+/// Name, value and allowed interval of every coefficient of a mapping; nothing without one.
+fn coefficients(mapping: Option<&Mapping>) -> Vec<(&'static str, f64, policy::Interval)> {
+    let Some(mapping) = mapping else {
         return Vec::new();
     };
     let Mapping { coefficients: k, .. } = mapping;
@@ -201,15 +247,15 @@ pub(crate) fn check_word(spec: Spec<'_>, coefficients: &[Term]) -> Term {
     coefficients.iter().fold(constant, combined)
 }
 
-/// Section 8: whether coefficients are accepted at run time. True without a mapping.
-pub(crate) fn accepted(spec: Spec<'_>, values: &[Term]) -> Term {
+/// Section 8: whether coefficients of an output are accepted at run time. True without a mapping.
+pub(crate) fn accepted(spec: Spec<'_>, path: &DutyPath<'_>, values: &[Term]) -> Term {
     let float = spec.float;
     let mut all = Vec::new();
-    for (value, (_, _, range)) in values.iter().zip(coefficients(spec)) {
+    for (value, (_, _, range)) in values.iter().zip(coefficients(path.mapping)) {
         let (low, high) = spec.inwards(range);
         all.push(float.within(*value, low, high));
     }
-    if let (Some(mapping), [a, _, _, r]) = (&spec.policy.mapping, values) {
+    if let (Some(mapping), [a, _, _, r]) = (path.mapping, values) {
         for end in [mapping.valid_i_out.low, mapping.valid_i_out.high] {
             let gain = float.add(*a, float.mul(*r, spec.nearest(end)));
             all.push(float.gt(gain, spec.zero()));
@@ -220,7 +266,6 @@ pub(crate) fn accepted(spec: Spec<'_>, values: &[Term]) -> Term {
 
 /// The state after `reset`, which keeps the coefficients of the state before and their check word.
 pub(crate) fn reset(spec: Spec<'_>, before: &State) -> State {
-    let limits = &spec.policy.limits;
     let held = spec.policy.signals.iter().map(|signal| {
         let (low, high) = (
             spec.format().up(signal.range.low),
@@ -241,11 +286,7 @@ pub(crate) fn reset(spec: Spec<'_>, before: &State) -> State {
         held: held.collect(),
         observers: zeros(&before.observers),
         memories: before.memories.iter().map(zeros).collect(),
-        previous_duty: spec.nearest(limits.initial_duty),
-        previous_command: spec.nearest(limits.initial_duty),
-        soft_cap: limits.soft_start.map(|start| spec.nearest(start.from)),
-        coefficients: before.coefficients.clone(),
-        check: before.check,
+        outputs: each(spec, before, Own::reset),
         bad_count: spec.counter(0),
         primed: spec.counter(0),
     }
@@ -253,13 +294,14 @@ pub(crate) fn reset(spec: Spec<'_>, before: &State) -> State {
 
 /// The state after `init`: the coefficients are those of the file.
 pub(crate) fn initial(spec: Spec<'_>, before: &State) -> State {
-    let coefficients: Vec<Term> = coefficients(spec)
-        .iter()
-        .map(|(_, value, _)| spec.nearest(*value))
-        .collect();
     State {
-        check: before.check.map(|_| check_word(spec, &coefficients)),
-        coefficients,
+        outputs: each(spec, before, Own::initial),
         ..reset(spec, before)
     }
+}
+
+fn each<'a>(spec: Spec<'a>, before: &State, of: fn(&Own, Spec<'a>, &DutyPath<'a>) -> Own) -> Vec<Own> {
+    let paths = spec.policy.paths();
+    let both = before.outputs.iter().zip(&paths);
+    both.map(|(own, path)| of(own, spec, path)).collect()
 }

@@ -4,7 +4,7 @@ use policy::Shape;
 
 use super::driver::{BITS_AND_FINITE, BOTH, COARSE, COARSE_FIRST, Entry, FINE, ONE, Writer};
 use super::head::Answer;
-use super::stated::stated;
+use super::stated::{Stated, label_of, stated, stated_of};
 
 impl Writer<'_> {
     /// Every state that is not sound, one number outside at a time and all others arbitrary.
@@ -54,7 +54,7 @@ impl Writer<'_> {
             }
         }
         self.close();
-        if self.policy.mapping.is_some() {
+        if !self.flips().is_empty() {
             let why = "that a coefficient with another check word is found, and that a step leaves the two together: relations, which intervals do not hold; the goals of `equivalence` say so";
             self.not_stated.push(("mapping_check".to_owned(), why));
         }
@@ -62,14 +62,20 @@ impl Writer<'_> {
             function: "prove_marked",
             about: "a state with a number, coefficients of the mapping aside, or a counter outside of its ends and all else arbitrary, every measurement and action",
             stated: vec![
-                stated("marked", "The fallback is commanded, with FALLBACK and STATE set."),
+                stated(
+                    "marked",
+                    match self.policy.paths().len() {
+                        1 => "The fallback is commanded, with FALLBACK and STATE set.",
+                        _ => "Every output commands its own fallback, with FALLBACK and STATE set.",
+                    },
+                ),
                 stated(
                     "kept",
                     "The state stays marked: `primed` becomes 2, memories and the count of bad steps 0.",
                 ),
             ],
             runs: BOTH,
-            assumed: &[],
+            assumed: Vec::new(),
             merged: Vec::new(),
             precisions: COARSE_FIRST,
         }
@@ -118,12 +124,10 @@ impl Writer<'_> {
         };
         self.text
             .line(format!("{n}_decide(&state, &front, {chosen}, &command);"));
-        let fallback = self.literal(self.number.nearest(self.policy.fallback.duty));
         // FALLBACK and STATE, and no other bit
         self.text
             .check("marked_status", &format!("command.status == {}u", (1 << 1) | (1 << 8)));
-        self.text.check("marked_duty", &format!("command.duty == {fallback}"));
-        self.text.check("marked_action", "command.action_index == 0u");
+        self.fallbacks();
         self.kept();
         self.text.lines(["}", ""]);
     }
@@ -166,24 +170,7 @@ impl Writer<'_> {
             stated("init", "`init` leaves a sound state, whatever was there."),
             stated("reset", "`reset` leaves a sound state sound."),
         ];
-        let coefficients: Vec<_> = self
-            .invariant
-            .words
-            .iter()
-            .filter(|word| word.place.starts_with("mapping_"))
-            .cloned()
-            .collect();
-        if !coefficients.is_empty() {
-            let arguments = vec!["ANY_NUMBER"; coefficients.len()].join(", ");
-            self.text.lines([
-                "sound(&state);".to_owned(),
-                format!("answer = {n}_set_mapping(&state, {arguments});"),
-            ]);
-            self.text.check("mapping_answer", "answer <= 1u");
-            claims.push(stated("mapping", "`set_mapping` answers 0 or 1, whatever it is given."));
-            let why = "what `set_mapping` takes over: its answer and its arguments are related, and intervals hold no relation";
-            self.not_stated.push(("mapping coefficients".to_owned(), why));
-        }
+        claims.extend(self.set_mapping());
         self.text.lines([
             "arbitrary(&state);".to_owned(),
             "measure(&measured);".to_owned(),
@@ -205,10 +192,34 @@ impl Writer<'_> {
             about: "init, reset, set_mapping, observe, integrity and integrity_slice with every input",
             stated: claims,
             runs: BOTH,
-            assumed: &[],
+            assumed: Vec::new(),
             merged: Vec::new(),
             precisions: COARSE_FIRST,
         }
+    }
+
+    /// The mapping of each output that has one.
+    fn set_mapping(&mut self) -> Vec<Stated> {
+        let mut claims = Vec::new();
+        let n = self.n().to_owned();
+        for output in self.policy.paths().iter().enumerate() {
+            let path = output.1;
+            let Some(mapping) = path.mapping else { continue };
+            let count = 3 + usize::from(mapping.coefficients.r.is_some());
+            let (function, arguments) = (path.named("set_mapping"), vec!["ANY_NUMBER"; count].join(", "));
+            self.text.lines([
+                "sound(&state);".to_owned(),
+                format!("answer = {n}_{function}(&state, {arguments});"),
+            ]);
+            self.text.check(&label_of("mapping", output), "answer <= 1u");
+            let text = format!("`{function}` answers 0 or 1, whatever it is given.");
+            claims.push(stated_of("mapping", output, &text));
+        }
+        if !claims.is_empty() {
+            let why = "what `set_mapping` takes over: its answer and its arguments are related, and intervals hold no relation";
+            self.not_stated.push(("mapping coefficients".to_owned(), why));
+        }
+        claims
     }
 
     /// The network with every observation.
@@ -255,7 +266,7 @@ impl Writer<'_> {
                 false => Vec::new(),
             },
             runs: if self.is_integer() { ONE } else { BITS_AND_FINITE },
-            assumed: &[],
+            assumed: Vec::new(),
             merged: self.curves(),
             precisions: self.sums_precisions(),
         }
@@ -277,7 +288,7 @@ impl Writer<'_> {
             about: "self_test, whatever the network answers",
             stated: vec![stated("self_test", "`self_test` gives 0 or the number of a vector.")],
             runs: ONE,
-            assumed: &["q_values"],
+            assumed: vec!["q_values".to_owned()],
             merged: Vec::new(),
             precisions: COARSE_FIRST,
         }

@@ -12,10 +12,10 @@
 use policy::{Activation, NumericFormat, Policy};
 
 use super::frama_c::{Machine, Numbers};
-use super::head::Answer;
+use super::head::{Answer, passes_nan, reads_state};
 use super::invariant::{Invariant, Shown, Word, slices};
 use super::number::Number;
-use super::stated::{Stated, command_claims, stated};
+use super::stated::{Stated, stated};
 use super::text::{Labels, Text};
 
 const LITTLE: Machine = Machine("x86_32");
@@ -23,9 +23,7 @@ const BIG: Machine = Machine("ppc_32");
 /// A step is also looked through for NaN and infinities. What is finite on one machine is so on the other: both round alike.
 const STEP: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any), (BIG, Numbers::Any), (LITTLE, Numbers::Finite)];
 /// The choice of an action takes most of the time of a step, and what follows takes any.
-const ACTION: &[&str] = &["choose"];
-/// That the check word of a sound state is that of its coefficients is what sound means.
-const VOUCHED: &[&str] = &["choose", "mapping_flips"];
+const ACTION: &str = "choose";
 /// Arithmetic alone; without a NaN from a sound state and finite measurements.
 pub(super) const BITS_AND_FINITE: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any), (LITTLE, Numbers::Finite)];
 /// Both byte orders, every bit pattern.
@@ -51,7 +49,7 @@ pub(super) struct Entry {
     /// Machines and numbers that it is analysed under.
     pub runs: &'static [(Machine, Numbers)],
     /// Functions of the policy, without its prefix, whose contract stands for their text. Another entry shows the contract.
-    pub assumed: &'static [&'static str],
+    pub assumed: Vec<String>,
     /// Functions of the policy, without its prefix, in which cases are not kept apart.
     pub merged: Vec<String>,
     /// Frama-C's `-eva-precision`, in the order in which they are tried until one shows everything.
@@ -181,7 +179,11 @@ impl Writer<'_> {
             },
             stated,
             runs: BITS_AND_FINITE,
-            assumed: if self.is_integer() { &[] } else { &["q_values"] },
+            assumed: if self.is_integer() {
+                Vec::new()
+            } else {
+                vec!["q_values".to_owned()]
+            },
             merged: self.curves(),
             precisions: if self.is_integer() {
                 self.sums_precisions()
@@ -200,23 +202,23 @@ impl Writer<'_> {
             "measure(&measured);".to_owned(),
             format!("{n}_step(&state, &measured, &command);"),
         ]);
-        let finite_only = self.passes_nan();
-        self.command(finite_only);
-        let mut claims = command_claims(finite_only);
+        let finite_only = passes_nan(&self.policy.head);
+        let mut claims = self.command(passes_nan);
         self.where_it_holds(finite_only, |text| {
             text.check("undamaged", &format!("(command.status & {}u) == 0u", 1 << 8))
         });
-        claims.push(Stated {
-            is_finite_only: finite_only,
-            ..stated("undamaged", "A sound state is never called damaged: STATE is clear.")
-        });
+        let undamaged = stated("undamaged", "A sound state is never called damaged: STATE is clear.");
+        claims.push(undamaged.finite_only(finite_only));
         self.counters();
         let held = self.policy.signals.len();
+        let paths = self.policy.paths();
+        let passing = paths.iter().filter(|path| passes_nan(path.head));
+        let unshown: Vec<String> = passing.map(|path| path.named("previous_duty")).collect();
         for (index, word) in self.invariant.words.clone().iter().enumerate() {
             if let Shown::ByContract(why) = word.shown {
                 self.not_stated.push((word.name.clone(), why));
             }
-            if word.shown == Shown::Directly && !(self.passes_nan() && word.place == "previous_duty") {
+            if word.shown == Shown::Directly && !unshown.contains(&word.place) {
                 let label = if index < held { "held" } else { "state" };
                 self.keeps(label, index, word);
             }
@@ -248,12 +250,12 @@ impl Writer<'_> {
             about: "one step from every sound state, every measurement",
             stated: claims,
             runs: if self.takes_output_as_it_is() { BOTH } else { STEP },
-            assumed: if self.policy.mapping.is_some() { VOUCHED } else { ACTION },
+            assumed: std::iter::once(ACTION.to_owned()).chain(self.flips()).collect(),
             merged: Vec::new(),
             precisions: match self.answer() {
                 // the law multiplies what the state holds
-                Answer::Gains(_) => FINE,
-                Answer::Index | Answer::Output => COARSE_FIRST,
+                Answer::Gains(_) if self.policy.head.schedule().is_some() => FINE,
+                _ => COARSE_FIRST,
             },
         }
     }
@@ -267,28 +269,6 @@ impl Writer<'_> {
             &format!("{label}_{index}"),
             &format!("{place} >= {low} && {place} <= {high}"),
         );
-    }
-
-    /// What the command is after every step; of the chosen duty perhaps for finite numbers only.
-    fn command(&mut self, finite_only: bool) {
-        let limits = self.policy.limits.duty;
-        let (low, high) = (self.number.up(limits.low), self.number.down(limits.high));
-        let fallback = self.literal(self.number.nearest(self.policy.fallback.duty));
-        let (low, high) = (self.literal(low), self.literal(high));
-        let duties = self.number.duties(&self.policy.head);
-        let least = duties.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = duties.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let (least, most) = (self.literal(least), self.literal(most));
-        let actions = self.policy.outputs();
-        self.text.check(
-            "duty",
-            &format!("(command.duty >= {low} && command.duty <= {high}) || command.duty == {fallback}"),
-        );
-        let chosen =
-            format!("(command.duty_sim >= {least} && command.duty_sim <= {most}) || command.duty_sim == {fallback}");
-        self.where_it_holds(finite_only, |text| text.check("chosen", &chosen));
-        self.text.check("action", &format!("command.action_index < {actions}u"));
-        self.text.check("status", "command.status < 512u");
     }
 
     fn counters(&mut self) {
@@ -307,11 +287,9 @@ impl Writer<'_> {
             format!("{n}_step(&state, &measured, &command);"),
         ]);
         // a law of control reads the state, and its clamps pass a NaN on
-        let finite_only = self.passes_nan() || self.reads_state();
-        self.command(finite_only);
+        let mut claims = self.command(|head| passes_nan(head) || reads_state(head));
         self.close();
-        let mut claims = command_claims(finite_only);
-        if finite_only {
+        if claims.iter().any(|claim| claim.is_finite_only) {
             let why = "a NaN of a damaged state passes the clip of the head or of the law: that it leads to the fallback is a relation, which \
                        intervals do not hold; the goals of `equivalence` say so";
             self.not_stated.push(("duty_sim of a damaged state".to_owned(), why));
@@ -322,7 +300,7 @@ impl Writer<'_> {
             about: "one step from every bit pattern of the state, every measurement",
             stated: claims,
             runs: BOTH,
-            assumed: ACTION,
+            assumed: vec![ACTION.to_owned()],
             merged: Vec::new(),
             precisions: FINE,
         }
@@ -374,7 +352,7 @@ impl Writer<'_> {
                 "Behind the first sample, the memories of low-pass filters and what stands behind them stay within their ends.",
             )],
             runs: ONE,
-            assumed: ACTION,
+            assumed: vec![ACTION.to_owned()],
             merged: Vec::new(),
             precisions: COARSE_FIRST,
         })
@@ -407,27 +385,6 @@ impl Writer<'_> {
             self.keeps("slices", *at, other);
         }
         self.text.lines(["}", ""]);
-    }
-
-    /// A command that the caller may have changed in whatever way.
-    pub fn any_command(&mut self) {
-        self.text.lines([
-            "command.duty = any_bits;",
-            "command.duty_sim = any_bits;",
-            "command.action_index = any_word;",
-            "command.status = any_word;",
-        ]);
-    }
-
-    /// A check that may hold for finite numbers only.
-    fn where_it_holds(&mut self, finite_only: bool, check: impl FnOnce(&mut Text)) {
-        if finite_only {
-            self.text.line("#if defined(FINITE)");
-        }
-        check(&mut self.text);
-        if finite_only {
-            self.text.line("#endif");
-        }
     }
 
     /// The curves of a network in integers that are computed piece by piece.

@@ -145,7 +145,7 @@ fn command(analysis: Analysis<'_>, precision: u8, table: &Path) -> Command {
     command
         .arg("-eva-slevel-function")
         .arg(format!("{policy}_guard:0,{policy}_sense:0{curves}"));
-    for function in *assumed {
+    for function in assumed {
         command.arg("-eva-use-spec").arg(format!("{policy}_{function}"));
     }
     command.args(["-eva-no-show-progress", "-eva-msg-key=-initial-state,-final-states"]);

@@ -15,23 +15,23 @@ pub(super) enum Answer {
     Gains(usize),
 }
 
+/// Whether a head makes a NaN of a NaN: a clip does, a curve by masks does not.
+pub(super) fn passes_nan(head: &Head) -> bool {
+    let passes = |squash: Squash| matches!(squash, Squash::Clip(_) | Squash::Curve(Activation::Softsign));
+    match head {
+        Head::Choice(_) | Head::Residual(_) => false,
+        Head::Several(outputs) => outputs.iter().any(|output| passes_nan(&output.head)),
+        Head::Continuous(head) => passes(head.squash),
+        Head::Schedule(head) => head.gains.iter().any(|gain| gain.squash.is_none_or(passes)),
+    }
+}
+
+/// Whether a law of control reads the state, beside what the network says.
+pub(super) fn reads_state(head: &Head) -> bool {
+    matches!(head, Head::Residual(_) | Head::Schedule(_))
+}
+
 impl Writer<'_> {
-    /// Whether the head makes a NaN of a NaN: a clip does, a curve by masks does not.
-    pub fn passes_nan(&self) -> bool {
-        let passes = |squash: Squash| matches!(squash, Squash::Clip(_) | Squash::Curve(Activation::Softsign));
-        match &self.policy.head {
-            // contracts with several outputs are refused when they are read
-            Head::Choice(_) | Head::Residual(_) | Head::Several(_) => false,
-            Head::Continuous(head) => passes(head.squash),
-            Head::Schedule(head) => head.gains.iter().any(|gain| gain.squash.is_none_or(passes)),
-        }
-    }
-
-    /// Whether a law of control reads the state, beside what the network says.
-    pub fn reads_state(&self) -> bool {
-        matches!(self.policy.head, Head::Residual(_) | Head::Schedule(_))
-    }
-
     /// Whether something is made of an output before anything bounds it.
     pub fn takes_output_as_it_is(&self) -> bool {
         let gains = self.policy.head.schedule().map_or(&[][..], |head| &head.gains);

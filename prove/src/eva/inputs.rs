@@ -65,7 +65,8 @@ impl Writer<'_> {
     /// That the check word of a sound state is that of the coefficients: a relation, which intervals do not hold. So it is a
     /// contract of the function that compares them, and stands for its text where a step begins with a sound state.
     fn vouches(&mut self) {
-        if self.policy.mapping.is_none() {
+        let flips = self.flips();
+        if flips.is_empty() {
             return;
         }
         let (n, word) = (self.n().to_owned(), self.number.word());
@@ -73,21 +74,28 @@ impl Writer<'_> {
             format!("extern volatile {word} any_check;"),
             "static uint32_t vouched;".to_owned(),
             String::new(),
-            "/*@ assigns \\result \\from *state, vouched;".to_owned(),
-            "  @ ensures vouched: vouched == 0 || \\result == 0;".to_owned(),
-            "  @*/".to_owned(),
-            format!("static {word} {n}_mapping_flips(const {n}_state *state);"),
-            String::new(),
         ]);
+        for function in flips {
+            self.text.lines([
+                "/*@ assigns \\result \\from *state, vouched;".to_owned(),
+                "  @ ensures vouched: vouched == 0 || \\result == 0;".to_owned(),
+                "  @*/".to_owned(),
+                format!("static {word} {n}_{function}(const {n}_state *state);"),
+                String::new(),
+            ]);
+        }
     }
 
     /// The check word: any, and whether it is taken for that of the coefficients.
     fn check_word(&mut self, vouched: bool) {
-        if self.policy.mapping.is_some() {
-            self.text.lines([
-                "state->mapping_check = any_check;".to_owned(),
-                format!("vouched = {}u;", u32::from(vouched)),
-            ]);
+        let paths = self.policy.paths();
+        let mut checks = paths.iter().filter(|path| path.mapping.is_some()).peekable();
+        if checks.peek().is_some() {
+            self.text.line(format!("vouched = {}u;", u32::from(vouched)));
+        }
+        for path in checks {
+            self.text
+                .line(format!("state->{} = any_check;", path.named("mapping_check")));
         }
     }
 

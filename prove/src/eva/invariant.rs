@@ -63,14 +63,18 @@ impl Invariant {
             let shown = shown.get(word).copied().unwrap_or(Shown::Directly);
             (format!("memory[{word}]"), shown)
         });
-        let duties = ["previous_duty", "previous_command"].map(str::to_owned);
-        let cap = state.soft_cap.map(|_| "soft_cap".to_owned());
-        let product = policy.mapping.and_then(|mapping| mapping.coefficients.r);
-        let letters = ["a", "b", "c"].into_iter().chain(product.map(|_| "r"));
-        let coefficients = letters
-            .filter(|_| policy.mapping.is_some())
-            .map(|name| format!("mapping_{name}"));
-        let others = duties.into_iter().chain(cap).chain(coefficients);
+        let paths = policy.paths();
+        // output by output (section 9b)
+        let others = paths.iter().enumerate().flat_map(|(index, path)| {
+            let duties = ["previous_duty", "previous_command"];
+            let cap = state.output(index).soft_cap.map(|_| "soft_cap");
+            let product = path.mapping.and_then(|mapping| mapping.coefficients.r);
+            let letters = ["mapping_a", "mapping_b", "mapping_c"];
+            let letters = letters.into_iter().chain(product.map(|_| "mapping_r"));
+            let coefficients = letters.filter(|_| path.mapping.is_some());
+            let stems = duties.into_iter().chain(cap).chain(coefficients);
+            stems.map(|stem| path.named(stem)).collect::<Vec<String>>()
+        });
         let places = held.chain(memory).chain(others.map(|place| (place, Shown::Directly)));
         let ends = controller.sound_ends();
         let words = places

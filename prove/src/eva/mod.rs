@@ -1,6 +1,7 @@
 //! Abstract interpretation of the generated C with Frama-C Eva.
 
 mod calls;
+mod command;
 mod driver;
 mod frama_c;
 mod head;
@@ -235,7 +236,7 @@ fn rest_on_others(parts: &mut [(&Entry, Vec<Claim>)]) {
             .map(|(function, claim)| (function, finite(claim)))
             .collect();
         for (entry, claims) in parts.iter_mut() {
-            for base in entry.assumed {
+            for base in &entry.assumed {
                 let function = format!("prove_{base}");
                 let shaky = |claim: &Claim| open.iter().any(|(own, of)| *own == function && *of == finite(claim));
                 let shown = claims.iter_mut().filter(|claim| claim.verdict == Verdict::Proved);
@@ -284,9 +285,9 @@ fn claims_of(task: Task<'_>, entry: &Entry, runs: &[(Job<'_>, &Found)], tool: &s
         let judged = runs
             .iter()
             .filter(|(job, _)| !stated.is_finite_only || job.numbers == Numbers::Finite)
-            .map(|(job, found)| checks(job, found, stated.label))
+            .map(|(job, found)| checks(job, found, &stated.label))
             .collect();
-        claims.push(claim(stated.label, &stated.text, judged));
+        claims.push(claim(&stated.name, &stated.text, judged));
     }
     claims
 }

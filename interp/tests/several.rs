@@ -38,6 +38,10 @@ hold = 1
 
 /// One layer: Q of the choice is x, -x and 0.5, the continuous output is x / 4. All of it is exact.
 fn controller() -> Controller<f32> {
+    load(CONTRACT)
+}
+
+fn load(contract: &str) -> Controller<f32> {
     let folder = tempfile::tempdir().unwrap();
     let weights: Vec<u8> = [1.0_f32, -1.0, 0.0, 0.25]
         .iter()
@@ -54,7 +58,7 @@ fn controller() -> Controller<f32> {
     )
     .unwrap();
     let path = folder.path().join("policy.toml");
-    std::fs::write(&path, CONTRACT).unwrap();
+    std::fs::write(&path, contract).unwrap();
     let options = policy::ReadOptions {
         several_outputs: true,
         ..policy::ReadOptions::default()
@@ -152,4 +156,48 @@ fn a_commit_needs_a_command_for_each_output() {
             "primed"
         ]
     );
+}
+
+/// h = g = 1, 8 V, no correction: a prediction from 2 V and 1 A is exact.
+const OBSERVERS: &str = r#"
+[[signal]]
+name = "i_out"
+range = [0.0, 8.0]
+
+[[observer]]
+name = "model_left"
+duty = "left"
+carrier = "centre"
+inductance = 1e-4
+capacitance = 1e-4
+input_voltage = 8.0
+output_voltage = "x"
+load_current = "i_out"
+compute_delay = 1
+gains = { current = 0.0, voltage = 0.0, bias = 0.0 }
+current = [0.0, 16.0]
+bias = [-1.0, 1.0]
+"#;
+
+#[test]
+fn an_observer_is_driven_by_the_command_of_its_own_output() {
+    let right = OBSERVERS.split_once("[[observer]]").unwrap().1;
+    let right = format!("[[observer]]{}", right.replace("left", "right"));
+    let contract = CONTRACT
+        .replace("[[feature]]", &format!("{OBSERVERS}\n{right}\n[[feature]]"))
+        .replace("duty = [0.0, 0.625] }", "duty = [0.0, 0.625], initial_duty = 0.25 }");
+    let mut controller = load(&contract);
+    let samples = [Sample::Physical(2.0), Sample::Physical(1.0)];
+    let trace = controller.step(&samples).unwrap();
+    // left, d = 0.25: a = 1 + 8 / 8 - 1, v = 2 + a - 1, i = 1 + 8 / 4 - 2
+    assert_eq!(trace.estimates[0], [1.0, 2.0, 0.0, 0.0]);
+    // right, d = 0.5: a = 1 + 8 / 4 - 1, v = 2 + a - 1, i = 1 + 8 / 2 - (2 + 3) / 2
+    assert_eq!(trace.estimates[1], [2.5, 3.0, 0.0, 0.0]);
+    // Q = 2, -2, 0.5 and 0.5: left stays at 0.25, right moves by its slew limit to 0.75
+    let commands: Vec<_> = trace.commands().collect();
+    assert_eq!(duties(&commands), [0.25, 0.75]);
+    let trace = controller.step(&samples).unwrap();
+    assert_eq!(trace.estimates[0], [1.0, 2.0, 0.0, 0.0]);
+    // from i = 2.5 and v = 3 with d = 0.75: a = 2.5 + 3 - 1.5, v = 3 + a - 1 ends at the 4 V of x, i = 2.5 + 6 - (3 + 4) / 2
+    assert_eq!(trace.estimates[1], [5.0, 4.0, 0.0, 0.0]);
 }

@@ -159,8 +159,9 @@ impl Policy {
     pub fn reads(&self, input: Input) -> bool {
         let observed = |observer: &Observer| match input {
             Input::PreviousCommand => true,
+            Input::OutputCommand(index) => observer.output == index,
             Input::Signal(index) => observer.signals().any(|own| own == index),
-            Input::PreviousDuty | Input::Estimate(..) | Input::OutputDuty(_) | Input::OutputCommand(_) => false,
+            Input::PreviousDuty | Input::Estimate(..) | Input::OutputDuty(_) => false,
         };
         let features = self.features.iter().map(|feature| &feature.source);
         let mut sources = features.chain(self.head.sources().map(|source| &source.tree));

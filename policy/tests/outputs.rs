@@ -177,8 +177,55 @@ fn what_an_output_lacks_or_has_too_much_is_said_at_its_place() {
     }
 }
 
+const OBSERVER: &str = r#"[[observer]]
+name = "model"
+duty = "right"
+inductance = 2e-3
+capacitance = 1.5e-3
+input_voltage = 200.0
+output_voltage = "v_out"
+load_current = "i_out"
+compute_delay = 1
+gains = { current = 0.1, voltage = 0.2, bias = 0.01 }
+current = [0.0, 60.0]
+bias = [-8.0, 4.0]
+
+[[output]]
+name = "left""#;
+
 #[test]
-fn a_law_an_observer_and_golden_answers_are_refused_with_the_way_out() {
+fn an_observer_names_the_output_that_drives_it() {
+    let observed = |duty: &str| {
+        let observer = OBSERVER.replace("duty = \"right\"\n", duty);
+        folder(4).replace("[[output]]\nname = \"left\"", &observer)
+    };
+    let of = |duty: &str| policy(&observed(duty));
+    let (left, right) = (of("duty = \"left\"\n"), of("duty = \"right\"\n"));
+    assert_eq!((left.observers[0].output, right.observers[0].output), (0, 1));
+    assert!(right.reads(Input::OutputCommand(1)) && !right.reads(Input::OutputCommand(0)));
+    assert_ne!(left.digests.contract, right.digests.contract);
+    let said = policy::describe::observers(&right);
+    assert!(said.contains("model: driven by right, "), "{said}");
+    assert_says(
+        &fault(&observed("")),
+        &["`duty` is missing", "left, right", "`duty = \"left\"`"],
+    );
+    let misspelt = fault(&observed("duty = \"rihgt\"\n"));
+    assert_says(&misspelt, &["no output `rihgt`", "did you mean `right`"]);
+    // nothing of the observer is reported where the list of outputs is what is wrong
+    let faulty = observed("duty = \"right\"\n").replace("name = \"right\"", "name = \"left\"");
+    assert_says(&fault(&faulty), &["`left` is used twice"]);
+}
+
+#[test]
+fn an_observer_of_one_output_names_none() {
+    let observer = OBSERVER.replace("[[output]]\nname = \"left\"", "[[feature]]\nname = \"e\"");
+    let single = Folder::new().replace("[[feature]]\nname = \"e\"", &observer);
+    assert_says(&single.fault(), &["names one of several outputs", "leave it out"]);
+}
+
+#[test]
+fn a_law_and_golden_answers_are_refused_with_the_way_out() {
     let law = folder(4).replace(
         "continuous = { squash = \"tanh\", scale = 0.3, offset = 0.5 }",
         "base = \"0.5\", offsets = [-0.1, 0.1]",

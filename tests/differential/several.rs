@@ -25,7 +25,7 @@ fn random_policies_with_several_outputs_are_equal_in_every_format() {
 }
 
 #[test]
-fn random_policies_with_several_outputs_reach_both_heads_every_limiter_and_two_to_four_outputs() {
+fn random_policies_with_several_outputs_reach_heads_limiters_observers_and_two_to_four_outputs() {
     let policies: Vec<Policy> = (0..60).map(|seed| load(seed).1).collect();
     let outputs = |policy: &Policy| match &policy.head {
         Head::Several(outputs) => outputs.clone(),
@@ -45,6 +45,11 @@ fn random_policies_with_several_outputs_reach_both_heads_every_limiter_and_two_t
         own.iter().any(|output| output.head.is_choice()) && own.iter().any(|output| !output.head.is_choice())
     };
     assert!(policies.iter().filter(mixed).count() > 10);
+    let observers: Vec<_> = policies.iter().flat_map(|policy| policy.observers.clone()).collect();
+    for (output, delay) in [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)] {
+        let is_drawn = |own: &policy::Observer| (own.output, own.compute_delay) == (output, delay);
+        assert!(observers.iter().any(is_drawn), "output {output}, delay {delay}");
+    }
 }
 
 #[test]

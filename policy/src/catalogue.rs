@@ -120,12 +120,6 @@ pub(crate) fn one_duty() -> Message {
         .hint("leave it out: the only duty drives the model")
 }
 
-pub(crate) fn golden_of_several() -> Message {
-    Message::new("golden answers are compared for one output")
-        .found("`golden` beside [[output]]")
-        .hint("compare them in a contract for each output: `policyc new MODEL --output N`")
-}
-
 pub(crate) fn columns_overlap(own: &std::ops::Range<usize>, other: &std::ops::Range<usize>) -> Message {
     Message::new("a column of the last layer decides two outputs")
         .found(format!("columns {} and {}", between(own), between(other)))

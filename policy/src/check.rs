@@ -278,15 +278,13 @@ fn golden(
     faults: &mut Sink,
 ) -> Option<Option<Golden>> {
     let Some(file) = &raw.golden else { return Some(None) };
-    if let (Head::Several(_), Some(at)) = (head, raw.contract.peek(&["network", "golden"])) {
-        faults.push(at.fault(catalogue::golden_of_several()));
-        return None;
-    }
     let (count, outputs) = sizes?;
+    let several: Vec<_> = several(head).iter().map(weights::golden::OutputShape::of).collect();
     let shape = weights::golden::Shape {
         features: count,
         outputs,
         head,
+        several: &several,
     };
     weights::golden::read(file, shape, features, network?.golden, faults).map(Some)
 }

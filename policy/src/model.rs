@@ -13,7 +13,7 @@ pub use crate::filter::Filter;
 pub use crate::head::{Action, Continuous, Factor, Gain, Head, Pair, Residual, Schedule, Source, Squash, Still};
 pub use crate::interval::Interval;
 use crate::known_answers;
-pub use crate::known_answers::Golden;
+pub use crate::known_answers::{Golden, OutputAnswers};
 pub use crate::observer::{Circuit, Estimate, Gains, Hold, InputVoltage, Observer, OnTime};
 pub use crate::output::{DutyPath, Output};
 

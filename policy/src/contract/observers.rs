@@ -170,12 +170,10 @@ fn driven(item: &Value<'_>, section: &mut Table<'_>, duties: Duties<'_>, faults:
         (Duties::Unknown, ..) => None,
         (Duties::Named(names), Some(value), Some(text)) => {
             let found = names.iter().position(|name| name == text);
-            if found.is_none() {
-                let names: Vec<&str> = names
-                    .iter()
-                    .map(String::as_str)
-                    .filter(|name| !name.is_empty())
-                    .collect();
+            // the name that is meant may be the faulty one, which has left its fault
+            let is_whole = names.iter().all(|name| !name.is_empty());
+            if found.is_none() && is_whole {
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
                 faults.push(value.fault(catalogue::unknown_name("output", text, &names)));
             }
             found

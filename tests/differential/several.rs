@@ -119,3 +119,35 @@ fn planted_defects_in_the_second_output_are_caught() {
         assert!(!report.unwrap().equal(), "{from} -> {to} was not seen");
     }
 }
+
+/// The estimates of a leg that another leg drives would look right as long as both command the same.
+#[test]
+fn an_observer_that_another_output_drives_is_caught() {
+    let (_folder, policy) = (0..60)
+        .map(load)
+        .find(|(_, policy)| policy.observers.first().is_some_and(|observer| observer.output == 1))
+        .expect("a policy whose first observer is driven by the second output");
+    let host = targets::find("host").unwrap();
+    let mut files = codegen::sources(&policy, host, &[codegen::Output::C], None)
+        .unwrap()
+        .files;
+    let names = policy.output_names();
+    let [own, other] = [names[1], names[0]].map(|name| format!("state->previous_command_{name}"));
+    let text = files.get_mut(&format!("{}.c", policy.name)).unwrap();
+    // observers stand before the features: the first value that is made of the command is theirs
+    let line = text
+        .lines()
+        .find(|line| line.starts_with("    const") && line.contains(&own));
+    let line = line.unwrap_or_else(|| panic!("{own}\n{text}")).to_owned();
+    *text = text.replacen(&line, &line.replace(&own, &other), 1);
+    let report = verify::run(
+        &policy,
+        verify::Options {
+            steps: 2000,
+            generated: Some(&files),
+            compilers: vec!["gcc".to_owned()],
+            ..verify::Options::default()
+        },
+    );
+    assert!(!report.unwrap().equal(), "{line}");
+}

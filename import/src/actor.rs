@@ -1,5 +1,6 @@
 //! Continuous actors: the way from the last layer to a command, as the contract's `[actions]` says it.
 
+use policy::limits::MAX_OUTPUTS;
 use policy::{Activation, DraftOutput};
 use toml_input::Message;
 
@@ -34,6 +35,14 @@ pub(crate) enum Duty {
 }
 
 impl Duty {
+    /// Columns of the last layer.
+    pub fn columns(self) -> usize {
+        match self {
+            Self::Command(_) => 1,
+            Self::Table(actions) => actions,
+        }
+    }
+
     /// The output in a contract to be filled in.
     pub fn draft(self) -> DraftOutput {
         match self {
@@ -174,13 +183,10 @@ pub(crate) fn short(x: f64) -> f64 {
     format!("{:?}", x as f32).parse().unwrap_or(x)
 }
 
-/// An actor with several commands.
+/// An actor with more commands than a contract has outputs.
 pub(crate) fn several(found: usize) -> Message {
-    Message::new("this actor commands several numbers, and its file does not say what each of them is")
+    Message::new("this actor commands more numbers than a contract has outputs")
         .found(format!("{found} outputs"))
-        .expected("one number, or a model of stable-baselines3, whose action space has the ends of each: at most 16")
-        .hint(
-            "say --output N if one of them is the duty: the others are left out; say --gains if they are the gains of a law. A contract for \
-             all of them has [[output]] in the place of [actions]",
-        )
+        .expected(format!("at most {MAX_OUTPUTS}"))
+        .hint("say --output N if one of them is the duty: the others are left out; say --gains if they are the gains of a law")
 }

@@ -25,6 +25,8 @@ pub(crate) struct Oracle<'a> {
     pub activation: Activation,
     /// The one output is a command, not a choice.
     pub is_actor: bool,
+    /// Columns of each of several outputs; none where there is one.
+    pub several: &'a [usize],
 }
 
 /// What says in a file's metadata that it was made here.
@@ -55,7 +57,11 @@ pub(crate) fn answers(oracle: &Oracle<'_>) -> Result<Option<Vec<u8>>, Message> {
         let draw = |(low, high): &(f64, f64)| f64::from(draws.uniform(*low, *high) as f32);
         let observation: Vec<f64> = oracle.bounds.iter().map(draw).collect();
         let values = oracle.outputs(&observation, &exact);
-        let best = if oracle.is_actor { Some(0) } else { decided(&values) };
+        let best = match oracle.several {
+            _ if oracle.is_actor => Some(0),
+            [] => decided(&values),
+            widths => all_decided(&values, widths).then_some(0),
+        };
         let Some(best) = best else { continue };
         actions = values.len();
         obs.extend(observation);
@@ -66,17 +72,20 @@ pub(crate) fn answers(oracle: &Oracle<'_>) -> Result<Option<Vec<u8>>, Message> {
         return Ok(None);
     }
     let chosen = action.iter().flat_map(|index: &i32| index.to_le_bytes()).collect();
+    if !oracle.several.is_empty() {
+        let said = format!(
+            "plain products in f64 of the tensors as saved, {MAKER}; {COUNT} observations drawn uniformly, seed {SEED}, those left out \
+             where the two largest values of a choice are closer than {SMALLEST_GAP:e} of the largest; output is the last layer's, before \
+             argmax, tanh or clip"
+        );
+        return layer(oracle, &obs, (&q, actions), said).map(Some);
+    }
     if oracle.is_actor {
         let said = format!(
             "plain products in f64 of the tensors as saved, {MAKER}; {COUNT} observations drawn uniformly, seed {SEED}; output is the \
              last layer's, before tanh or clip"
         );
-        let metadata = BTreeMap::from([("oracle".to_owned(), said)]);
-        let tensors = [
-            ("obs".to_owned(), vec![COUNT, oracle.bounds.len()], rounded(&obs)?),
-            ("output".to_owned(), vec![COUNT, actions], rounded(&q)?),
-        ];
-        return written(&tensors, &metadata).map(Some);
+        return layer(oracle, &obs, (&q, actions), said).map(Some);
     }
     let said = format!(
         "plain products in f64 of the tensors as saved, {MAKER}; {COUNT} observations drawn uniformly, seed {SEED}, those left out \
@@ -90,6 +99,31 @@ pub(crate) fn answers(oracle: &Oracle<'_>) -> Result<Option<Vec<u8>>, Message> {
         ("action".to_owned(), vec![COUNT], chosen),
     ];
     written(&tensors, &metadata).map(Some)
+}
+
+/// Observations with the last layer alone.
+fn layer(
+    oracle: &Oracle<'_>,
+    obs: &[f64],
+    (output, columns): (&[f64], usize),
+    said: String,
+) -> Result<Vec<u8>, Message> {
+    let metadata = BTreeMap::from([("oracle".to_owned(), said)]);
+    let tensors = [
+        ("obs".to_owned(), vec![COUNT, oracle.bounds.len()], rounded(obs)?),
+        ("output".to_owned(), vec![COUNT, columns], rounded(output)?),
+    ];
+    written(&tensors, &metadata)
+}
+
+/// Whether every choice among several outputs is clear.
+fn all_decided(values: &[f64], widths: &[usize]) -> bool {
+    let mut rest = values;
+    widths.iter().all(|width| {
+        let (own, behind) = rest.split_at((*width).min(rest.len()));
+        rest = behind;
+        *width == 1 || decided(own).is_some()
+    })
 }
 
 impl Oracle<'_> {

@@ -14,6 +14,7 @@
 mod activations;
 mod actor;
 mod arrays;
+mod duties;
 mod golden;
 mod hdf5;
 mod mat;
@@ -35,6 +36,7 @@ use policy::limits::{MAX_GAINS, MAX_WEIGHT_BYTES};
 use policy::{Draft, DraftFeature, seen_from};
 use toml_input::{Faults, FileName, Message, Origin};
 
+use actor::Duty;
 pub use network::{Layer, Network};
 use read::Loaded;
 use recognise::{Recognised, Refusal, recognise};
@@ -49,6 +51,8 @@ pub struct Options {
     /// Which output of several is the duty, or which dimension of a MultiDiscrete; the others are left out. Without it all are
     /// kept, where the file says what each is.
     pub output: Option<usize>,
+    /// Columns of each of several outputs, where the file does not say what they are: 1 is a duty as a number, N a choice among N.
+    pub outputs: Vec<usize>,
     /// The outputs are the gains of a law: all of them are kept.
     pub gains: bool,
     /// What VecNormalize saved; without it a `vecnormalize.pkl` beside the file is taken.
@@ -121,7 +125,9 @@ pub fn new_policy(file: impl Into<FileName>, contract: &Path, options: &Options)
     };
     let statistics = statistics(&name, options)?;
     match network {
-        Some(network) if !network.plain || !loaded.is_safetensors || !statistics.is_empty() => {
+        Some(network)
+            if !network.plain || !loaded.is_safetensors || !statistics.is_empty() || !options.outputs.is_empty() =>
+        {
             written(&name, contract, &loaded, &network, &statistics, options)
         }
         // several chains side by side, or none: the contract's own reader explains, or asks for the prefix
@@ -152,22 +158,18 @@ fn statistics(file: &FileName, options: &Options) -> Result<Vec<DraftFeature>, F
 /// The bytes of a file of golden answers, if there is one.
 type GoldenFile = Option<Vec<u8>>;
 
-/// The trainer's golden answers that lie beside the model, or those of the tensors as saved. None for several outputs: golden answers
-/// are compared for one.
+/// The trainer's golden answers that lie beside the model, or those of the tensors as saved.
 fn answers(
     name: &FileName,
     loaded: &Loaded,
     network: &Network,
     statistics: &[DraftFeature],
-    (inputs, actions): (usize, Option<usize>),
+    (inputs, actions, several): (usize, Option<usize>, &[Duty]),
 ) -> Result<(GoldenFile, GoldenFile), Faults> {
-    if !loaded.several.is_empty() {
-        return Ok((None, None));
-    }
-    let given = given_answers(name, inputs, actions)?;
+    let given = given_answers(name, inputs, actions, several)?;
     let golden = match given {
         Some(_) => None,
-        None => golden_answers(loaded, network, statistics).map_err(|message| name.fault(message))?,
+        None => golden_answers(loaded, network, statistics, several).map_err(|message| name.fault(message))?,
     };
     Ok((given, golden))
 }
@@ -191,37 +193,24 @@ fn written(
     let outputs = network.layers.last().map_or(0, |layer| layer.outputs);
     // gains and one command are answered with other tensors than the values of actions
     let actions = (outputs > 1 && !options.gains).then_some(outputs);
-    let (given, golden) = answers(name, loaded, network, statistics, (inputs, actions))?;
+    let several = duties::of(loaded, network, options).map_err(|message| name.fault(message))?;
+    let (given, golden) = answers(name, loaded, network, statistics, (inputs, actions, &several))?;
     let mut said = loaded.about.clone();
     said.extend(network.said.iter().cloned());
     let definition = network.definition.as_ref();
     let actor = definition.map(|definition| definition.actor).or(loaded.actor);
-    let outputs = network.layers.last().map_or(0, |layer| layer.outputs);
+    let actor = actor.filter(|_| several.is_empty());
     let gains = match options.gains {
         true => gains(loaded, actor, outputs).map_err(|message| name.fault(message))?,
         false => Vec::new(),
     };
     said.extend(actor.filter(|_| gains.is_empty()).map(actor::Actor::said));
-    if !loaded.several.is_empty() {
-        let count = loaded.several.len();
-        said.push(format!(
-            "{count} outputs, each a duty of its own; `policyc new MODEL --output N` makes a contract for one of them, with golden answers"
-        ));
-    }
+    said.extend(said_of(&several));
     said.extend(definition.iter().flat_map(|definition| definition.said.iter().cloned()));
     if !statistics.is_empty() && loaded.graph.as_ref().is_none_or(|graph| graph.features.is_empty()) {
         said.push("VecNormalize: scale = 1/sqrt(var + epsilon), offset = -mean/sqrt(var + epsilon), then clip, all computed in f64".to_owned());
     }
-    if given.is_some() {
-        said.push(format!(
-            "{GOLDEN} beside the model is taken as the trainer's: its obs are what the network sees, after scale, offset and clip"
-        ));
-    }
-    if golden.is_some() {
-        said.push(format!(
-            "{GOLDEN} was computed from the tensors as saved, in f64; the trainer's own answers check more"
-        ));
-    }
+    said.extend(of_golden(given.is_some(), golden.is_some()));
     let own = FileName::new(&contract.with_file_name(WEIGHTS)).among(name.held.as_ref());
     let is_taken = own.is_same(name);
     let file = if is_taken { CHAIN } else { WEIGHTS };
@@ -239,7 +228,7 @@ fn written(
         continuous: actor.map(actor::Actor::entry),
         duties: actor.filter(|_| gains.is_empty()).and_then(actor::Actor::duties),
         gains,
-        several: loaded.several.iter().map(|duty| duty.draft()).collect(),
+        several: several.iter().map(|duty| duty.draft()).collect(),
         about: said.clone(),
         features: match definition {
             _ if !statistics.is_empty() => statistics.to_vec(),
@@ -256,6 +245,27 @@ fn written(
         contract: policy::draft(&draft),
         beside,
         said,
+    })
+}
+
+/// Whose golden answers lie beside the contract.
+fn of_golden(is_given: bool, is_computed: bool) -> Option<String> {
+    match (is_given, is_computed) {
+        (true, _) => Some(format!(
+            "{GOLDEN} beside the model is taken as the trainer's: its obs are what the network sees, after scale, offset and clip"
+        )),
+        (false, true) => Some(format!(
+            "{GOLDEN} was computed from the tensors as saved, in f64; the trainer's own answers check more"
+        )),
+        (false, false) => None,
+    }
+}
+
+/// That every output is kept, and how one is picked.
+fn said_of(several: &[Duty]) -> Option<String> {
+    let count = several.len();
+    (count > 0).then(|| {
+        format!("{count} outputs, each a duty of its own; `policyc new MODEL --output N` makes a contract for one of them alone")
     })
 }
 
@@ -282,7 +292,12 @@ fn gains(loaded: &Loaded, actor: Option<actor::Actor>, outputs: usize) -> Result
 ///
 /// # Errors
 /// Of answers that no network with so many inputs and actions gives: a contract that names them is refused.
-fn given_answers(model: &FileName, inputs: usize, actions: Option<usize>) -> Result<Option<Vec<u8>>, Faults> {
+fn given_answers(
+    model: &FileName,
+    inputs: usize,
+    actions: Option<usize>,
+    several: &[Duty],
+) -> Result<Option<Vec<u8>>, Faults> {
     let name = FileName {
         origin: Origin::Caller,
         ..model.with_file_name(GOLDEN)
@@ -295,7 +310,8 @@ fn given_answers(model: &FileName, inputs: usize, actions: Option<usize>) -> Res
         return Ok(None);
     }
     if let Some(actions) = actions {
-        policy::golden_fits(&name, bytes.clone(), inputs, actions)?;
+        let names = duties::names(several);
+        policy::golden_fits(&name, bytes.clone(), inputs, actions, &duties::shapes(several, &names))?;
     }
     Ok(Some(bytes))
 }
@@ -321,7 +337,12 @@ fn activation(loaded: &Loaded, network: &Network) -> Option<String> {
 }
 
 /// Golden answers where the file says of what and through which layers.
-fn golden_answers(loaded: &Loaded, network: &Network, statistics: &[DraftFeature]) -> Result<Option<Vec<u8>>, Message> {
+fn golden_answers(
+    loaded: &Loaded,
+    network: &Network,
+    statistics: &[DraftFeature],
+    several: &[Duty],
+) -> Result<GoldenFile, Message> {
     let (Some((layers, quantiles)), Some(activation)) = (&loaded.original, loaded.activation) else {
         return Ok(None);
     };
@@ -345,6 +366,7 @@ fn golden_answers(loaded: &Loaded, network: &Network, statistics: &[DraftFeature
         quantiles: *quantiles,
         activation,
         is_actor: loaded.actor.is_some(),
+        several: &several.iter().map(|duty| duty.columns()).collect::<Vec<_>>(),
     })
 }
 

@@ -24,7 +24,7 @@ pub(crate) struct Loaded {
     pub about: Vec<String>,
     /// Each command of a model whose outputs are gains.
     pub commands: Vec<Actor>,
-    /// What each of several duties is; the network is that of `original`.
+    /// What each of several duties is; the network is that of `original`, or of the graph.
     pub several: Vec<Duty>,
     /// The command is a number; the network is that of `original`, or of the graph.
     pub actor: Option<Actor>,
@@ -65,6 +65,7 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
         return Ok(Loaded {
             actor: graph.actor,
             commands: graph.commands.clone(),
+            several: graph.several.clone(),
             graph: Some(graph),
             ..Loaded::default()
         });
@@ -120,6 +121,7 @@ fn known(options: &Options) -> Known {
         actions: options.actions,
         output: options.output,
         gains: options.gains,
+        are_commands: !options.outputs.is_empty() && options.outputs.iter().all(|width| *width == 1),
         epsilons: Vec::new(),
     }
 }
@@ -146,6 +148,15 @@ fn model(archive: &Archive<'_>, options: &Options) -> Result<Loaded, Message> {
         return Err(Message::new("--actions is not the number of actions of this model")
             .found(said.to_string())
             .expected(format!("{}, as its action space says", model.actions)));
+    }
+    if !options.outputs.is_empty() && model.several.is_empty() {
+        return Err(Message::new("--outputs says something else than the file")
+            .found(format!(
+                "--outputs, and an action space with {} outputs for one duty",
+                model.actions
+            ))
+            .expected("no --outputs")
+            .hint("what the outputs are stands in the action space"));
     }
     Ok(Loaded {
         tensors: model.tensors,

@@ -44,6 +44,29 @@ fn assert_columns(policy: &policy::Policy, columns: std::ops::Range<usize>) {
     }
 }
 
+/// The last layer was computed of the tensors as saved, and every choice of it is clear.
+fn assert_golden(policy: &policy::Policy) {
+    let golden = policy.golden.as_ref().unwrap();
+    assert_eq!(golden.q_values.len(), policy.outputs() * golden.count);
+    let features = policy.features.len();
+    let rows = golden.observations.chunks_exact(features);
+    for (x, expected) in rows.zip(golden.q_values.chunks_exact(policy.outputs())) {
+        let x: Vec<f64> = x.iter().map(|x| f64::from(*x)).collect();
+        let found = run(policy, &x, |v| v.max(0.0));
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - f64::from(*expected)).abs() < 1e-4, "{found} {expected}");
+        }
+        for path in policy.paths().iter().filter(|path| path.head.is_choice()) {
+            let mut own = expected[path.columns()].to_vec();
+            own.sort_by(f32::total_cmp);
+            let [.., next, best] = own.as_slice() else {
+                panic!("{own:?}")
+            };
+            assert!(best > next, "{own:?}");
+        }
+    }
+}
+
 #[test]
 fn a_multidiscrete_becomes_a_choice_for_each_dimension() {
     let (_folder, new, policy) = policy_of("sb3_multidiscrete.zip", &Options::default());
@@ -55,6 +78,7 @@ fn a_multidiscrete_becomes_a_choice_for_each_dimension() {
     assert_eq!(widths, [(0..2, true), (2..5, true)]);
     assert!(new.contract.contains("5 outputs for 2 duties"), "{}", new.contract);
     assert_columns(&policy, 0..5);
+    assert_golden(&policy);
     let faults = refused("sb3_multidiscrete.zip", &output(2));
     assert!(
         faults.contains("--output names none") && faults.contains("0 to 1"),
@@ -84,6 +108,7 @@ fn several_commands_of_sb3_become_outputs_with_their_own_ends() {
     assert_eq!(columns, [0..1, 1..2, 2..3, 3..4, 4..5]);
     assert_eq!(policy.output_names(), ["u0", "u1", "u2", "u3", "u4"]);
     assert_columns(&policy, 0..5);
+    assert_golden(&policy);
 }
 
 #[test]
@@ -152,9 +177,27 @@ fn the_commands_of_sb3_as_gains_keep_their_own_ends() {
 }
 
 #[test]
+fn several_commands_of_a_graph_become_outputs_with_their_own_scale() {
+    let (_folder, new, policy) = policy_of("several_actor.onnx", &Options::default());
+    for entry in [
+        "3 outputs for 3 duties",
+        "squash = \"tanh\", scale = 0.375, offset = 0.475 }",
+        "squash = \"tanh\", scale = 0.02, offset = 0.03 }",
+    ] {
+        assert!(new.contract.contains(entry), "{entry}\n{}", new.contract);
+    }
+    let columns: Vec<_> = policy.paths().iter().map(|path| path.columns()).collect();
+    assert_eq!(columns, [0..1, 1..2, 2..3]);
+    let duties: Vec<_> = policy.paths().iter().map(|path| path.head.duties()).collect();
+    assert!(
+        (duties[0][0] - 0.1).abs() < 1e-6 && (duties[2][1] - 0.05).abs() < 1e-6,
+        "{duties:?}"
+    );
+    assert!(!new.contract.contains("the one output"), "{}", new.contract);
+}
+
+#[test]
 fn of_several_commands_of_a_graph_one_is_kept_with_its_own_scale() {
-    let faults = refusal(&fixture("several_actor.onnx"));
-    assert!(faults.contains("commands several numbers"), "{faults}");
     let (_folder, new, policy) = policy_of("several_actor.onnx", &output(0));
     assert!(
         new.contract
@@ -179,6 +222,74 @@ fn of_several_commands_of_a_graph_one_is_kept_with_its_own_scale() {
     ] {
         assert!(new.contract.contains(entry), "{entry}\n{}", new.contract);
     }
+}
+
+#[test]
+fn several_commands_of_a_definition_become_outputs_with_their_own_scale() {
+    let tensors = [dense("fc1", 16, 6), dense("fc_mu", 3, 16)].concat();
+    let scales = [common::named("action_scale", &[3]), common::named("action_bias", &[3])];
+    let saved = Saved::new(&[tensors, scales.to_vec()].concat());
+    let new = import::new_policy(&saved.weights(), &saved.contract(), &Options::default()).unwrap();
+    let (scales, biases) = (saved.values("action_scale"), saved.values("action_bias"));
+    // decimals as short as binary32 takes them, at each step
+    let short = |x: f64| format!("{:?}", x as f32).parse::<f64>().unwrap();
+    for (scale, bias) in scales.iter().zip(&biases) {
+        let (scale, bias) = (short(f64::from(*scale)), short(f64::from(*bias)));
+        let own = format!("{:?} to {:?}", short(bias - scale), short(bias + scale));
+        assert!(new.contract.contains(&own), "{own}\n{}", new.contract);
+    }
+    let open = "scale = \"TODO\", offset = \"TODO\"";
+    let filled = import::NewPolicy {
+        contract: new.contract.replace(open, "scale = 0.1, offset = 0.5"),
+        ..new
+    };
+    let policy = saved.filled(&filled);
+    assert_eq!(policy.output_names(), ["u0", "u1", "u2"]);
+    assert_eq!(policy.layers.last().unwrap().weights, saved.values("fc_mu.weight"));
+    // more than a contract holds, and no word which of them is the duty
+    let wide = Saved::new(&[dense("fc1", 16, 6), dense("fc_mu", 17, 16), scales_of(17)].concat());
+    let faults = import::new_policy(&wide.weights(), &wide.contract(), &Options::default()).unwrap_err();
+    assert!(faults.to_string().contains("at most 16"), "{faults}");
+}
+
+fn scales_of(count: usize) -> Vec<(String, Vec<usize>)> {
+    vec![
+        common::named("action_scale", &[count]),
+        common::named("action_bias", &[count]),
+    ]
+}
+
+#[test]
+fn tensors_that_say_nothing_of_their_outputs_are_shared_out_as_the_user_says() {
+    let saved = Saved::new(&[dense("fc1", 16, 6), dense("out", 4, 16)].concat());
+    let outputs = |list: &[usize]| Options {
+        outputs: list.to_vec(),
+        ..Options::default()
+    };
+    let new = |options: &Options| import::new_policy(&saved.weights(), &saved.contract(), options);
+    let mixed = saved.filled(&new(&outputs(&[3, 1])).unwrap());
+    let widths: Vec<_> = mixed
+        .paths()
+        .iter()
+        .map(|path| (path.columns(), path.head.is_choice()))
+        .collect();
+    assert_eq!(widths, [(0..3, true), (3..4, false)]);
+    let all = new(&outputs(&[1, 1, 1, 1])).unwrap();
+    let open = "scale = \"TODO\", offset = \"TODO\"";
+    let all = import::NewPolicy {
+        contract: all.contract.replace(open, "scale = 0.1, offset = 0.5"),
+        ..all
+    };
+    assert_eq!(saved.filled(&all).output_names().len(), 4);
+    let shared = new(&outputs(&[3, 2])).unwrap_err().to_string();
+    assert!(
+        shared.contains("together 5") && shared.contains("add up to 4"),
+        "{shared}"
+    );
+    let known = refused("sb3_several.zip", &outputs(&[3, 2]));
+    assert!(known.contains("says something else than the file"), "{known}");
+    let known = refused("sb3_dqn.zip", &outputs(&[3, 2]));
+    assert!(known.contains("--outputs"), "{known}");
 }
 
 #[test]

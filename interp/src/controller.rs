@@ -343,13 +343,13 @@ impl<T: Real> Controller<T> {
         trace.sound = self.sound.holds(state);
         trace.usable = trace.sound && (trace.all_valid || (trace.primed && !trace.expired));
 
-        let measured = Measured {
-            signals: &trace.signals,
-            valid: &trace.valid,
-            primed: trace.primed,
-            previous_command: state.previous_command,
-        };
         for (observer, estimates) in self.observers.iter().zip(&mut trace.estimates) {
+            let measured = Measured {
+                signals: &trace.signals,
+                valid: &trace.valid,
+                primed: trace.primed,
+                previous_command: state.output(observer.output).previous_command,
+            };
             *estimates = observer.estimates(measured, &state.memory);
         }
         let inputs = Inputs {

@@ -4,8 +4,10 @@
 //! actions are compared with those of the rounded network, and each change is weighed by what it gives up of the trainer's
 //! own Q values.
 
-use ndarray::{Array1, aview1};
-use policy::{Golden, NumericFormat, Policy, Scalar};
+use std::ops::Range;
+
+use ndarray::{Array1, Axis, aview1};
+use policy::{Golden, Head, NumericFormat, Policy, Scalar};
 use serde::Serialize;
 
 use crate::duties::{Duties, duties};
@@ -25,6 +27,18 @@ pub enum Decisions {
     Continuous(Duties),
     /// Which gains a gain schedule sets.
     Schedule(Gains),
+    /// What becomes of each of several outputs, in their order.
+    Several(Vec<OutputDecisions>),
+}
+
+/// What the numeric format does to one output of several.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OutputDecisions {
+    /// Name of the output.
+    pub output: String,
+    /// As of a contract with this output alone.
+    #[serde(flatten)]
+    pub decisions: Decisions,
 }
 
 /// The trainer's choices against those of the numeric format.
@@ -74,6 +88,7 @@ impl Decisions {
             Decisions::Choice(choices) => choices.kept(),
             Decisions::Continuous(duties) => duties.kept(),
             Decisions::Schedule(gains) => gains.kept(),
+            Decisions::Several(outputs) => outputs.iter().all(|own| own.decisions.kept()),
         }
     }
 
@@ -84,16 +99,57 @@ impl Decisions {
             Decisions::Choice(choices) => choices.numeric_format,
             Decisions::Continuous(duties) => duties.numeric_format,
             Decisions::Schedule(gains) => gains.numeric_format,
+            Decisions::Several(outputs) => outputs.first().map_or("", |own| own.decisions.numeric_format()),
         }
     }
 
-    /// The entry of `[network]` that accepts them.
+    /// Those of each output, with its name; the only ones without.
+    #[must_use]
+    pub fn each(&self) -> Vec<(Option<&str>, &Decisions)> {
+        match self {
+            Decisions::Several(outputs) => outputs
+                .iter()
+                .map(|own| (Some(own.output.as_str()), &own.decisions))
+                .collect(),
+            one => vec![(None, one)],
+        }
+    }
+
+    /// The outputs that the format changes more than allowed, with their names.
+    pub fn beyond(&self) -> impl Iterator<Item = (Option<&str>, &Decisions)> {
+        self.each().into_iter().filter(|(_, own)| !own.kept())
+    }
+
+    /// The entries of `[network]` that accept them.
     #[must_use]
     pub fn remedy(&self) -> String {
+        let share = self.accepting_share();
+        let share = share.map(|share| format!("golden_decisions = {share}"));
+        let error = self.told().into_iter().filter_map(|own| match own {
+            Decisions::Continuous(duties) => Some(duties.largest),
+            Decisions::Schedule(gains) => Some(gains.largest),
+            Decisions::Choice(_) | Decisions::Several(_) => None,
+        });
+        let error = error.reduce(f64::max).map(accepting_error);
+        let entries: Vec<String> = share.into_iter().chain(error).collect();
+        entries.join(" and ")
+    }
+
+    /// The smallest share of two digits that accepts every choice among them; `None` without a choice to accept.
+    #[must_use]
+    pub fn accepting_share(&self) -> Option<f64> {
+        let shares = self.told().into_iter().filter_map(|own| match own {
+            Decisions::Choice(choices) => Some(choices.accepting_share()),
+            _ => None,
+        });
+        shares.reduce(f64::max)
+    }
+
+    /// What there is to accept: of several outputs those that are beyond what is allowed.
+    fn told(&self) -> Vec<&Decisions> {
         match self {
-            Decisions::Choice(choices) => format!("golden_decisions = {}", choices.accepting_share()),
-            Decisions::Continuous(duties) => accepting_error(duties.largest),
-            Decisions::Schedule(gains) => accepting_error(gains.largest),
+            Decisions::Several(_) => self.beyond().map(|(_, own)| own).collect(),
+            one => vec![one],
         }
     }
 }
@@ -129,26 +185,69 @@ impl Choices {
 /// `allowed` is the share of choices that may change, in the place of the contract's; a head without a choice has none.
 #[must_use]
 pub fn decisions(policy: &Policy, allowed: Option<f64>) -> Option<Decisions> {
-    if let Some(head) = policy.head.continuous() {
-        return duties(policy, head).map(Decisions::Continuous);
+    let golden = policy.golden.as_ref()?;
+    let Head::Several(outputs) = &policy.head else {
+        let asked = Asked {
+            policy,
+            head: &policy.head,
+            columns: 0..policy.outputs(),
+            golden,
+        };
+        return of_one(&asked, allowed);
+    };
+    let each = outputs.iter().enumerate().filter_map(|(index, own)| {
+        let columns = own.columns();
+        let asked = Asked {
+            policy,
+            head: &own.head,
+            golden: &golden.of_output(index, &columns),
+            columns,
+        };
+        Some(OutputDecisions {
+            output: own.name.clone(),
+            decisions: of_one(&asked, allowed)?,
+        })
+    });
+    Some(Decisions::Several(each.collect()))
+}
+
+/// One output with the answers that are its own.
+pub(crate) struct Asked<'a> {
+    pub policy: &'a Policy,
+    pub head: &'a Head,
+    /// Of the last layer.
+    pub columns: Range<usize>,
+    pub golden: &'a Golden,
+}
+
+fn of_one(asked: &Asked<'_>, allowed: Option<f64>) -> Option<Decisions> {
+    let Asked { policy, golden, .. } = asked;
+    if let Some(head) = asked.head.continuous() {
+        return Some(Decisions::Continuous(duties(asked, head)));
     }
-    if let Some(head) = policy.head.schedule() {
+    if let Some(head) = asked.head.schedule() {
         return gains(policy, head).map(Decisions::Schedule);
     }
-    let golden = policy.golden.as_ref()?;
     let found = match policy.numeric_format.scalar() {
-        Scalar::F32 => actions::<f32>(policy, golden),
-        Scalar::F64 => actions::<f64>(policy, golden),
+        Scalar::F32 => actions::<f32>(asked),
+        Scalar::F64 => actions::<f64>(asked),
     };
-    let reference = reference(policy, golden);
+    let reference = reference(asked);
     let allowed = allowed.unwrap_or_else(|| golden.allowed_changes(policy.numeric_format));
     Some(Decisions::Choice(weigh(policy, golden, &reference, &found, allowed)))
 }
 
 /// The actions in the policy's own format.
-fn actions<T: Real>(policy: &Policy, golden: &Golden) -> Vec<usize> {
-    let answers = answers::<T>(&Controller::new(policy), golden);
+fn actions<T: Real>(asked: &Asked<'_>) -> Vec<usize> {
+    let answers = answers_of::<T>(asked, asked.policy);
     answers.iter().map(|q| argmax(q.view())).collect()
+}
+
+/// The output's columns of what a policy answers.
+pub(crate) fn answers_of<T: Real>(asked: &Asked<'_>, policy: &Policy) -> Vec<Array1<T>> {
+    let answers = answers::<T>(&Controller::new(policy), asked.golden);
+    let own = |row: Array1<T>| row.slice_axis(Axis(0), asked.columns.clone().into()).to_owned();
+    answers.into_iter().map(own).collect()
 }
 
 /// Outputs for each golden observation; a controller that refuses an observation, which the check rules out, gives 0.
@@ -164,14 +263,15 @@ pub(crate) fn answers<T: Real>(controller: &Controller<T>, golden: &Golden) -> V
 }
 
 /// The trainer's Q values; where it gave actions only, those of its network in binary64.
-fn reference(policy: &Policy, golden: &Golden) -> Vec<Vec<f64>> {
-    if !golden.q_values.is_empty() {
-        let rows = golden.q_values.chunks_exact(policy.outputs().max(1));
+fn reference(asked: &Asked<'_>) -> Vec<Vec<f64>> {
+    let known = &asked.golden.q_values;
+    if !known.is_empty() {
+        let rows = known.chunks_exact(asked.columns.len().max(1));
         return rows.map(|row| row.iter().copied().map(f64::from).collect()).collect();
     }
     // binary64 stands for exact arithmetic: the format at hand must not be its own judge
-    let exact = policy.clone().with_format(NumericFormat::F64);
-    let answers = answers::<f64>(&Controller::new(&exact), golden);
+    let exact = asked.policy.clone().with_format(NumericFormat::F64);
+    let answers = answers_of::<f64>(asked, &exact);
     answers.into_iter().map(|q| q.to_vec()).collect()
 }
 

@@ -3,9 +3,9 @@
 use policy::{Continuous, Golden, NumericFormat, Policy, Scalar};
 use serde::Serialize;
 
-use crate::decisions::answers;
+use crate::Real;
+use crate::decisions::{Asked, answers_of};
 use crate::head::Head;
-use crate::{Controller, Real};
 
 /// The trainer's duties against those of the numeric format. Errors are shares of the head's range, from its least to its
 /// largest duty.
@@ -48,11 +48,11 @@ impl Duties {
     }
 }
 
-/// Answers the golden observations in the policy's format; `None` without golden vectors.
-pub(crate) fn duties(policy: &Policy, head: &Continuous) -> Option<Duties> {
-    let golden = policy.golden.as_ref()?;
-    let expected = expected(policy, head, golden);
-    let found = found(policy, golden);
+/// Answers the golden observations in the policy's format.
+pub(crate) fn duties(asked: &Asked<'_>, head: &Continuous) -> Duties {
+    let Asked { policy, golden, .. } = asked;
+    let expected = expected(asked, head);
+    let found = found(asked, policy);
     let errors: Vec<f64> = expected.iter().zip(&found).map(|(e, f)| error(head, *e, *f)).collect();
     let worst = (0..errors.len()).reduce(|worst, row| if errors[row] > errors[worst] { row } else { worst });
     let features = policy.features.len().max(1);
@@ -65,7 +65,7 @@ pub(crate) fn duties(policy: &Policy, head: &Continuous) -> Option<Duties> {
             found: found[row],
         })
     };
-    Some(Duties {
+    Duties {
         numeric_format: policy.numeric_format.name(),
         observations: golden.count,
         range: head.span(),
@@ -73,7 +73,7 @@ pub(crate) fn duties(policy: &Policy, head: &Continuous) -> Option<Duties> {
         mean: errors.iter().sum::<f64>() / golden.count.max(1) as f64,
         allowed: golden.allowed_duty_error(policy.numeric_format),
         worst: worst.and_then(told),
-    })
+    }
 }
 
 /// Difference of two duties as a share of the head's range; infinite if one is no number.
@@ -83,12 +83,12 @@ pub(crate) fn error(head: &Continuous, expected: f64, found: f64) -> f64 {
 }
 
 /// The trainer's duties: as recorded, else those of its outputs, else those of its network in binary64.
-fn expected(policy: &Policy, head: &Continuous, golden: &Golden) -> Vec<f64> {
-    if let Some(known) = given(head, golden) {
+fn expected(asked: &Asked<'_>, head: &Continuous) -> Vec<f64> {
+    if let Some(known) = given(head, asked.golden) {
         return known;
     }
     // binary64 stands for exact arithmetic: the format at hand must not be its own judge
-    found(&policy.clone().with_format(NumericFormat::F64), golden)
+    found(asked, &asked.policy.clone().with_format(NumericFormat::F64))
 }
 
 /// What the golden vectors say of the duties; `None` if they hold neither duties nor outputs.
@@ -100,17 +100,16 @@ pub(crate) fn given(head: &Continuous, golden: &Golden) -> Option<Vec<f64>> {
     (!golden.q_values.is_empty()).then(|| outputs.collect())
 }
 
-fn found(policy: &Policy, golden: &Golden) -> Vec<f64> {
+fn found(asked: &Asked<'_>, policy: &Policy) -> Vec<f64> {
     match policy.numeric_format.scalar() {
-        Scalar::F32 => in_format::<f32>(policy, golden),
-        Scalar::F64 => in_format::<f64>(policy, golden),
+        Scalar::F32 => in_format::<f32>(asked, policy),
+        Scalar::F64 => in_format::<f64>(asked, policy),
     }
 }
 
-fn in_format<T: Real>(policy: &Policy, golden: &Golden) -> Vec<f64> {
-    let controller = Controller::<T>::new(policy);
-    let head = Head::<T>::new(&policy.head);
-    let answers = answers(&controller, golden);
+fn in_format<T: Real>(asked: &Asked<'_>, policy: &Policy) -> Vec<f64> {
+    let head = Head::<T>::new(asked.head);
+    let answers = answers_of::<T>(asked, policy);
     answers
         .iter()
         .map(|outputs| head.decide(outputs.view()).1.to_f64())

@@ -145,6 +145,7 @@ pub(crate) fn judge(golden: &Golden, head: &Schedule, answers: &[&[f64]]) -> Gol
         activations: Vec::new(),
         tolerance: golden.tolerance,
         rounded: false,
+        outputs: Vec::new(),
     }
 }
 
@@ -211,6 +212,7 @@ mod tests {
             action_indices: Vec::new(),
             duties: vec![0.65, 0.25],
             law: vec![0.3, 1.0, 1.0, 0.3, 2.0, 1.0],
+            outputs: Vec::new(),
             tolerance: 1e-5,
             decisions: None,
             duty_error: None,

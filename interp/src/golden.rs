@@ -8,8 +8,9 @@ use serde::Serialize;
 
 use crate::decisions::answers;
 pub use crate::refusal::refusal;
+pub use crate::several::OutputResult;
 use crate::{Controller, Real, argmax};
-use crate::{duties, gains};
+use crate::{duties, gains, several};
 
 /// Known answers of the trainer against the interpreter or a build.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -41,6 +42,9 @@ pub struct GoldenResult {
     /// in binary32 then.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub rounded: bool,
+    /// Each of several outputs, in their order; the numbers above are then their sums and largest errors. Empty where there is one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub outputs: Vec<OutputResult>,
 }
 
 impl GoldenResult {
@@ -48,6 +52,9 @@ impl GoldenResult {
     /// the actions are [`crate::decisions::Decisions`], which know ties.
     #[must_use]
     pub fn passed(&self) -> bool {
+        if !self.outputs.is_empty() {
+            return self.outputs.iter().all(|own| own.result.passed());
+        }
         let actions = self.actions_equal == self.actions_compared;
         let errors = match [self.worst_duty_error, self.worst_gain_error] {
             [None, None] => [self.worst_relative_error, None],
@@ -63,8 +70,13 @@ impl GoldenResult {
 }
 
 impl fmt::Display for GoldenResult {
-    /// In one line: equal actions, the largest error of Q beside the allowed one, and whether that is too much.
+    /// In one line: equal actions, the largest error of Q beside the allowed one, and whether that is too much; of several outputs
+    /// each by its name.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.outputs.is_empty() {
+            let each: Vec<String> = self.outputs.iter().map(ToString::to_string).collect();
+            return f.write_str(&each.join("; "));
+        }
         let mut parts = Vec::new();
         if self.actions_compared > 0 {
             parts.push(format!(
@@ -100,8 +112,8 @@ impl fmt::Display for GoldenResult {
 #[must_use]
 pub fn judge(golden: &Golden, head: &Head, answers: &[&[f64]]) -> GoldenResult {
     match head {
-        // contracts with several outputs have no golden answers
-        Head::Choice(_) | Head::Residual(_) | Head::Several(_) => judge_choices(golden, answers),
+        Head::Several(outputs) => several::judge(golden, outputs, answers),
+        Head::Choice(_) | Head::Residual(_) => judge_choices(golden, answers),
         Head::Continuous(head) => judge_duties(golden, head, answers),
         Head::Schedule(head) => gains::judge(golden, head, answers),
     }
@@ -136,6 +148,7 @@ fn judge_duties(golden: &Golden, head: &policy::Continuous, answers: &[&[f64]]) 
         activations: Vec::new(),
         tolerance: golden.tolerance,
         rounded: false,
+        outputs: Vec::new(),
     }
 }
 
@@ -166,6 +179,7 @@ fn judge_choices(golden: &Golden, answers: &[&[f64]]) -> GoldenResult {
         activations: Vec::new(),
         tolerance: golden.tolerance,
         rounded: false,
+        outputs: Vec::new(),
     }
 }
 
@@ -269,7 +283,7 @@ impl GoldenResult {
     #[must_use]
     pub fn hint(&self) -> String {
         match self.activations.as_slice() {
-            [] => self.general_hint().to_owned(),
+            [] => several::hint(self).unwrap_or_else(|| self.general_hint().to_owned()),
             fitting => format!(
                 "with hidden_activation = {} the same weights give all {} golden answers",
                 fitting.join(" or "),
@@ -308,6 +322,7 @@ mod tests {
             action_indices: vec![0, 1],
             duties: Vec::new(),
             law: Vec::new(),
+            outputs: Vec::new(),
             tolerance: 1e-5,
             decisions: None,
             duty_error: None,
@@ -331,6 +346,7 @@ mod tests {
             activations: Vec::new(),
             tolerance,
             rounded: false,
+            outputs: Vec::new(),
         };
         assert_eq!(result(2e-5, 1e-5, 2).hint(), ROUNDED);
         assert_eq!(result(2e-5, 1e-5, 1).hint(), MISREAD, "another decision");

@@ -46,6 +46,7 @@ mod path;
 mod real;
 mod refusal;
 mod sanitise;
+mod several;
 mod sound;
 pub mod state;
 pub mod status;

@@ -9,6 +9,8 @@ use crate::real::{Range, Real};
 pub(crate) struct Observer<T> {
     /// First word in the memory of the controller.
     start: usize,
+    /// Index of the output whose command drives it.
+    pub output: usize,
     delayed: bool,
     topology: Circuit,
     carrier: OnTime,
@@ -49,6 +51,7 @@ pub(crate) struct Measured<'a, T> {
     pub signals: &'a [T],
     pub valid: &'a [bool],
     pub primed: bool,
+    /// Of the output that drives the observer.
     pub previous_command: T,
 }
 
@@ -58,6 +61,7 @@ impl<T: Real> Observer<T> {
         let gains = observer.gains;
         Self {
             start,
+            output: observer.output,
             delayed: observer.compute_delay == 1,
             topology: observer.topology,
             carrier: observer.carrier,

@@ -19,6 +19,7 @@ fn golden(observations: &[f32], q_values: &[f32], actions: &[u32]) -> Golden {
         action_indices: actions.to_vec(),
         duties: Vec::new(),
         law: Vec::new(),
+        outputs: Vec::new(),
         tolerance: 1e-4,
         decisions: None,
         duty_error: None,

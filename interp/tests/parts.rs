@@ -146,6 +146,7 @@ fn answers_of_the_trainer_are_compared_row_by_row() {
         action_indices: vec![1, 0, 1],
         duties: Vec::new(),
         law: Vec::new(),
+        outputs: Vec::new(),
         tolerance: 1e-4,
         decisions: None,
         duty_error: None,

@@ -1,7 +1,10 @@
 //! Several outputs (contract section 9b), against values by hand.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::disallowed_methods)]
 
+use interp::decisions::{Decisions, decisions};
+use interp::golden::{golden_result, refusal};
 use interp::{Command, Controller, InputError, Sample, status};
+use policy::{NumericFormat, Policy};
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize};
 
@@ -38,6 +41,15 @@ hold = 1
 
 /// One layer: Q of the choice is x, -x and 0.5, the continuous output is x / 4. All of it is exact.
 fn controller() -> Controller<f32> {
+    load(CONTRACT)
+}
+
+fn load(contract: &str) -> Controller<f32> {
+    Controller::new(&policy(contract, &[]))
+}
+
+/// Of a contract beside this file of golden answers.
+fn policy(contract: &str, golden: &[u8]) -> Policy {
     let folder = tempfile::tempdir().unwrap();
     let weights: Vec<u8> = [1.0_f32, -1.0, 0.0, 0.25]
         .iter()
@@ -54,13 +66,13 @@ fn controller() -> Controller<f32> {
     )
     .unwrap();
     let path = folder.path().join("policy.toml");
-    std::fs::write(&path, CONTRACT).unwrap();
+    std::fs::write(&path, contract).unwrap();
     let options = policy::ReadOptions {
         several_outputs: true,
         ..policy::ReadOptions::default()
     };
-    let policy = policy::load_with(&path, &options).unwrap_or_else(|faults| panic!("{faults}"));
-    Controller::new(&policy)
+    std::fs::write(folder.path().join("golden.safetensors"), golden).unwrap();
+    policy::load_with(&path, &options).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
 fn step(controller: &mut Controller<f32>, x: f32) -> Vec<Command<f32>> {
@@ -152,4 +164,147 @@ fn a_commit_needs_a_command_for_each_output() {
             "primed"
         ]
     );
+}
+
+/// h = g = 1, 8 V, no correction: a prediction from 2 V and 1 A is exact.
+const OBSERVERS: &str = r#"
+[[signal]]
+name = "i_out"
+range = [0.0, 8.0]
+
+[[observer]]
+name = "model_left"
+duty = "left"
+carrier = "centre"
+inductance = 1e-4
+capacitance = 1e-4
+input_voltage = 8.0
+output_voltage = "x"
+load_current = "i_out"
+compute_delay = 1
+gains = { current = 0.0, voltage = 0.0, bias = 0.0 }
+current = [0.0, 16.0]
+bias = [-1.0, 1.0]
+"#;
+
+#[test]
+fn an_observer_is_driven_by_the_command_of_its_own_output() {
+    let right = OBSERVERS.split_once("[[observer]]").unwrap().1;
+    let right = format!("[[observer]]{}", right.replace("left", "right"));
+    let contract = CONTRACT
+        .replace("[[feature]]", &format!("{OBSERVERS}\n{right}\n[[feature]]"))
+        .replace("duty = [0.0, 0.625] }", "duty = [0.0, 0.625], initial_duty = 0.25 }");
+    let mut controller = load(&contract);
+    let samples = [Sample::Physical(2.0), Sample::Physical(1.0)];
+    let trace = controller.step(&samples).unwrap();
+    // left, d = 0.25: a = 1 + 8 / 8 - 1, v = 2 + a - 1, i = 1 + 8 / 4 - 2
+    assert_eq!(trace.estimates[0], [1.0, 2.0, 0.0, 0.0]);
+    // right, d = 0.5: a = 1 + 8 / 4 - 1, v = 2 + a - 1, i = 1 + 8 / 2 - (2 + 3) / 2
+    assert_eq!(trace.estimates[1], [2.5, 3.0, 0.0, 0.0]);
+    // Q = 2, -2, 0.5 and 0.5: left stays at 0.25, right moves by its slew limit to 0.75
+    let commands: Vec<_> = trace.commands().collect();
+    assert_eq!(duties(&commands), [0.25, 0.75]);
+    let trace = controller.step(&samples).unwrap();
+    assert_eq!(trace.estimates[0], [1.0, 2.0, 0.0, 0.0]);
+    // from i = 2.5 and v = 3 with d = 0.75: a = 2.5 + 3 - 1.5, v = 3 + a - 1 ends at the 4 V of x, i = 2.5 + 6 - (3 + 4) / 2
+    assert_eq!(trace.estimates[1], [5.0, 4.0, 0.0, 0.0]);
+}
+
+/// With golden answers at x = 1, 2 and -4: these last layers, actions of left and duties of right, as far as they are given.
+fn answered(output: &[f32], actions: &[i32], duties: &[f32]) -> Policy {
+    let floats = |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|x| x.to_le_bytes()).collect() };
+    let (obs, output, duties) = (floats(&[1.0, 2.0, -4.0]), floats(output), floats(duties));
+    let actions: Vec<u8> = actions.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let tensors = [
+        ("obs", Dtype::F32, vec![3, 1], &obs),
+        ("output", Dtype::F32, vec![3, 4], &output),
+        ("action_left", Dtype::I32, vec![3], &actions),
+        ("duty_right", Dtype::F32, vec![3], &duties),
+    ];
+    let given = tensors.iter().filter(|(.., bytes)| !bytes.is_empty());
+    let views =
+        given.map(|(name, dtype, shape, bytes)| (*name, TensorView::new(*dtype, shape.clone(), bytes).unwrap()));
+    let golden = serialize(views, None).unwrap();
+    let contract = CONTRACT.replace("[network]", "[network]\ngolden = \"golden.safetensors\"");
+    policy(&contract, &golden)
+}
+
+const LAYER: [f32; 12] = [1.0, -1.0, 0.5, 0.25, 2.0, -2.0, 0.5, 0.5, -4.0, 4.0, 0.5, -1.0];
+
+#[test]
+fn golden_answers_are_judged_output_by_output() {
+    let own = answered(&LAYER, &[0, 0, 1], &[0.625, 0.75, 0.0]);
+    let result = golden_result(&own).unwrap();
+    assert!(result.passed() && refusal(&own).is_none(), "{result}");
+    assert_eq!(
+        (result.vectors, result.actions_equal, result.actions_compared),
+        (3, 3, 3)
+    );
+    assert_eq!(
+        (result.worst_relative_error, result.worst_duty_error),
+        (Some(0.0), Some(0.0))
+    );
+    let said = result.to_string();
+    for part in [
+        "left: action equal in 3 of 3",
+        "; right: largest error of the duty 0.0e0",
+    ] {
+        assert!(said.contains(part), "{said}");
+    }
+    // the column of right is another network's: its duty is off by 0.25 / 2 of 1, and left is what it was
+    let mut layer = LAYER;
+    layer[3] += 0.25;
+    let own = answered(&layer, &[0, 0, 1], &[]);
+    let result = golden_result(&own).unwrap();
+    let passed: Vec<bool> = result.outputs.iter().map(|own| own.result.passed()).collect();
+    assert_eq!((passed, result.worst_duty_error), (vec![true, false], Some(0.125)));
+    assert!(result.to_string().contains("; right: DIFFERENT: "), "{result}");
+    assert!(result.hint().starts_with("output `right`: "), "{}", result.hint());
+    let refused = format!("{:?}", refusal(&own).unwrap());
+    assert!(refused.contains("right: DIFFERENT"), "{refused}");
+    // told, not judged: of each output
+    assert!(result.told(true).passed());
+}
+
+#[test]
+fn what_a_format_changes_is_counted_output_by_output() {
+    let kept = decisions(&answered(&LAYER, &[], &[]), None).unwrap();
+    let names: Vec<_> = kept.each().iter().map(|(name, _)| name.unwrap().to_owned()).collect();
+    assert_eq!(
+        (names, kept.kept(), kept.numeric_format()),
+        (vec!["left".to_owned(), "right".to_owned()], true, "f32")
+    );
+    // in the trainer's second row another Q is the largest, and his duty in the first is 0.01 of 1 away
+    let mut otherwise = LAYER;
+    otherwise[4] = 0.25;
+    let duties = [0.635, 0.75, 0.0];
+    let changed = decisions(&answered(&otherwise, &[], &duties), None).unwrap();
+    let beyond: Vec<_> = changed.beyond().collect();
+    let [
+        (Some("left"), Decisions::Choice(left)),
+        (Some("right"), Decisions::Continuous(right)),
+    ] = beyond.as_slice()
+    else {
+        panic!("{beyond:?}")
+    };
+    assert_eq!((left.changed, left.observations, left.worst[0].row), (1, 3, 1));
+    assert!((right.largest - 0.01).abs() < 1e-6 && right.worst.as_ref().unwrap().row == 0);
+    assert_eq!(changed.remedy(), "golden_decisions = 0.34 and golden_duty = 1.0e-2");
+    assert_eq!(changed.accepting_share(), Some(0.34));
+    // an entry for what is beyond, and for nothing else
+    let duty = decisions(&answered(&LAYER, &[], &duties), None).unwrap();
+    assert!(
+        duty.accepting_share().is_none() && duty.remedy().starts_with("golden_duty"),
+        "{}",
+        duty.remedy()
+    );
+    for (allowed, kept) in [(0.33, false), (0.34, true)] {
+        let own = decisions(&answered(&otherwise, &[], &[]), Some(allowed)).unwrap();
+        assert_eq!(own.kept(), kept, "{allowed}");
+    }
+    for format in NumericFormat::ALL {
+        let own = decisions(&answered(&LAYER, &[], &[]).with_format(format), None).unwrap();
+        assert_eq!((own.numeric_format(), own.each().len()), (format.name(), 2));
+        assert!(own.kept(), "{own:?}");
+    }
 }

@@ -187,6 +187,14 @@ impl Inputs {
         self.signals.get(index).copied()
     }
 
+    /// What a command of the output of that index can be; of the only one where there is one.
+    pub fn command(&self, output: usize) -> Bounded {
+        match self.outputs.is_empty() {
+            true => Ok(self.previous_command),
+            false => self.output(output, 1),
+        }
+    }
+
     fn output(&self, index: usize, which: usize) -> Bounded {
         let ranges = self.outputs.get(index).map(|ranges| ranges[which]);
         ranges.ok_or(Overflow(f64::INFINITY))

@@ -104,16 +104,20 @@ pub(crate) fn law_of_several() -> Message {
         .hint("write a contract for each output: `policyc new MODEL --output N`")
 }
 
-pub(crate) fn observer_of_several() -> Message {
-    Message::new("an observer is driven by one duty")
-        .found("several outputs")
-        .hint("write a contract for each output: `policyc new MODEL --output N`")
+pub(crate) fn whose_duty(names: &[String]) -> Message {
+    let first = names.first().map_or("left", String::as_str);
+    missing_key(
+        "duty",
+        "[[observer]]",
+        &format!("which of the outputs drives this model: `duty = \"{first}\"`"),
+    )
+    .expected(format!("one of {}", names.join(", ")))
 }
 
-pub(crate) fn golden_of_several() -> Message {
-    Message::new("golden answers are compared for one output")
-        .found("`golden` beside [[output]]")
-        .hint("compare them in a contract for each output: `policyc new MODEL --output N`")
+pub(crate) fn one_duty() -> Message {
+    Message::new("`duty` names one of several outputs, and this contract has one")
+        .found("`duty` in an [[observer]] without [[output]]")
+        .hint("leave it out: the only duty drives the model")
 }
 
 pub(crate) fn columns_overlap(own: &std::ops::Range<usize>, other: &std::ops::Range<usize>) -> Message {

@@ -90,18 +90,22 @@ fn sections<'a>(raw: &'a RawPolicy, faults: &mut Sink) -> Sections<'a> {
     let mut taken = Vec::new();
     let head = head::read(&mut root, &mut taken, faults);
     let signals = signals::read(&mut root, &mut taken, faults);
+    // before the observers, which name the output that drives them
+    let several = outputs::names(&mut root, &mut taken, raw.several, faults);
+    let names = several.as_ref().map(outputs::Outputs::names);
     let around = observers::Surroundings {
         names: &signals.names,
         signals: &signals.list,
+        duties: match &names {
+            Some(names) => observers::Duties::Named(names),
+            None if outputs::are_given(&raw.contract) => observers::Duties::Unknown,
+            None => observers::Duties::One,
+        },
     };
     let observers = observers::read(&mut root, &around, &mut taken, faults);
-    let several = outputs::names(&mut root, &mut taken, raw.several, faults);
     let mut estimates = observers.estimates.clone();
     if let Some(several) = &several {
         estimates.extend(several.remembered.iter().cloned());
-        if let Some(value) = raw.contract.peek(&["observer"]) {
-            faults.push(value.fault(catalogue::observer_of_several()));
-        }
     }
     let around = features::Surroundings {
         signals: &signals.names,
@@ -274,15 +278,13 @@ fn golden(
     faults: &mut Sink,
 ) -> Option<Option<Golden>> {
     let Some(file) = &raw.golden else { return Some(None) };
-    if let (Head::Several(_), Some(at)) = (head, raw.contract.peek(&["network", "golden"])) {
-        faults.push(at.fault(catalogue::golden_of_several()));
-        return None;
-    }
     let (count, outputs) = sizes?;
+    let several: Vec<_> = several(head).iter().map(weights::golden::OutputShape::of).collect();
     let shape = weights::golden::Shape {
         features: count,
         outputs,
         head,
+        several: &several,
     };
     weights::golden::read(file, shape, features, network?.golden, faults).map(Some)
 }

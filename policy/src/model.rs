@@ -13,7 +13,7 @@ pub use crate::filter::Filter;
 pub use crate::head::{Action, Continuous, Factor, Gain, Head, Pair, Residual, Schedule, Source, Squash, Still};
 pub use crate::interval::Interval;
 use crate::known_answers;
-pub use crate::known_answers::Golden;
+pub use crate::known_answers::{Golden, OutputAnswers};
 pub use crate::observer::{Circuit, Estimate, Gains, Hold, InputVoltage, Observer, OnTime};
 pub use crate::output::{DutyPath, Output};
 
@@ -159,8 +159,9 @@ impl Policy {
     pub fn reads(&self, input: Input) -> bool {
         let observed = |observer: &Observer| match input {
             Input::PreviousCommand => true,
+            Input::OutputCommand(index) => observer.output == index,
             Input::Signal(index) => observer.signals().any(|own| own == index),
-            Input::PreviousDuty | Input::Estimate(..) | Input::OutputDuty(_) | Input::OutputCommand(_) => false,
+            Input::PreviousDuty | Input::Estimate(..) | Input::OutputDuty(_) => false,
         };
         let features = self.features.iter().map(|feature| &feature.source);
         let mut sources = features.chain(self.head.sources().map(|source| &source.tree));

@@ -37,6 +37,10 @@ pub struct Observer {
     /// Periods, 0 or 1, from a measurement to the duty that was computed of it. With 1 the estimates are those of the instant
     /// at which that duty begins.
     pub compute_delay: u32,
+    /// Which of several outputs commands the duty that drives it: index into [`crate::Policy::paths`], 0 where there is one.
+    // left out where it is 0: contracts with one output keep their digest
+    #[serde(skip_serializing_if = "is_first")]
+    pub output: usize,
     /// What one volt between measured and predicted output voltage corrects.
     pub gains: Gains,
     /// What the estimated current is clamped to, in A; 0 below is a diode.
@@ -71,6 +75,12 @@ impl Circuit {
     fn is_buck(&self) -> bool {
         *self == Circuit::Buck
     }
+}
+
+/// Serde calls it with a reference.
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_first(output: &usize) -> bool {
+    *output == 0
 }
 
 /// When in a period the switch of an observer's model is on.

@@ -24,6 +24,14 @@ pub struct Output {
     pub fallback: f64,
 }
 
+impl Output {
+    /// Its columns of the last layer.
+    #[must_use]
+    pub fn columns(&self) -> std::ops::Range<usize> {
+        self.column..self.column + self.head.outputs()
+    }
+}
+
 /// A head as the digest of a contract takes it; outputs have no other than these two.
 fn shown<S: serde::Serializer>(head: &Head, serializer: S) -> Result<S::Ok, S::Error> {
     (head.actions(), head.continuous()).serialize(serializer)

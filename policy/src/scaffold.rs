@@ -220,29 +220,34 @@ pub fn draft(draft: &Draft) -> String {
     if !draft.bias {
         text += "bias = false                 # the file holds none\n";
     }
+    text += &golden(draft, folder);
     if has_several {
         return text + &several(&draft.several);
-    }
-    let beside = if draft.golden { "" } else { "# " };
-    let golden = toml::Value::String(format!("{folder}golden.safetensors"));
-    let _ = writeln!(
-        text,
-        "{beside}golden = {golden}   # obs [n, inputs], {} from the trainer",
-        match outputs {
-            _ if is_law => "output [n, gains]",
-            1 => "output [n], duty [n]",
-            _ => "q [n, actions], action [n]",
-        }
-    );
-    if draft.is_drawn {
-        // a drawn row is no evidence that a feature is wrong: bounds of a training reach beyond what sensors show
-        text += "golden_outside = 0.95           # they were drawn from the bounds: those that the sensors cannot show are left out\n";
     }
     text += &match is_law {
         true => law(&draft.gains),
         false => actions(draft.continuous.as_deref(), *outputs),
     };
     text + &protection(draft.duties)
+}
+
+/// The golden answers, as a comment where there are none.
+fn golden(draft: &Draft, folder: &str) -> String {
+    let beside = if draft.golden { "" } else { "# " };
+    let golden = toml::Value::String(format!("{folder}golden.safetensors"));
+    let answers = match draft.outputs {
+        _ if !draft.gains.is_empty() => "output [n, gains]",
+        // names of the outputs are the user's: the last layer alone outlives a change of them
+        _ if !draft.several.is_empty() => "output [n, columns of the last layer]",
+        1 => "output [n], duty [n]",
+        _ => "q [n, actions], action [n]",
+    };
+    let mut text = format!("{beside}golden = {golden}   # obs [n, inputs], {answers} from the trainer\n");
+    if draft.is_drawn {
+        // a drawn row is no evidence that a feature is wrong: bounds of a training reach beyond what sensors show
+        text += "golden_outside = 0.95           # they were drawn from the bounds: those that the sensors cannot show are left out\n";
+    }
+    text
 }
 
 /// The outputs, each with limits and fallback, and what all share.

@@ -177,8 +177,55 @@ fn what_an_output_lacks_or_has_too_much_is_said_at_its_place() {
     }
 }
 
+const OBSERVER: &str = r#"[[observer]]
+name = "model"
+duty = "right"
+inductance = 2e-3
+capacitance = 1.5e-3
+input_voltage = 200.0
+output_voltage = "v_out"
+load_current = "i_out"
+compute_delay = 1
+gains = { current = 0.1, voltage = 0.2, bias = 0.01 }
+current = [0.0, 60.0]
+bias = [-8.0, 4.0]
+
+[[output]]
+name = "left""#;
+
 #[test]
-fn a_law_an_observer_and_golden_answers_are_refused_with_the_way_out() {
+fn an_observer_names_the_output_that_drives_it() {
+    let observed = |duty: &str| {
+        let observer = OBSERVER.replace("duty = \"right\"\n", duty);
+        folder(4).replace("[[output]]\nname = \"left\"", &observer)
+    };
+    let of = |duty: &str| policy(&observed(duty));
+    let (left, right) = (of("duty = \"left\"\n"), of("duty = \"right\"\n"));
+    assert_eq!((left.observers[0].output, right.observers[0].output), (0, 1));
+    assert!(right.reads(Input::OutputCommand(1)) && !right.reads(Input::OutputCommand(0)));
+    assert_ne!(left.digests.contract, right.digests.contract);
+    let said = policy::describe::observers(&right);
+    assert!(said.contains("model: driven by right, "), "{said}");
+    assert_says(
+        &fault(&observed("")),
+        &["`duty` is missing", "left, right", "`duty = \"left\"`"],
+    );
+    let misspelt = fault(&observed("duty = \"rihgt\"\n"));
+    assert_says(&misspelt, &["no output `rihgt`", "did you mean `right`"]);
+    // nothing of the observer is reported where the list of outputs is what is wrong
+    let faulty = observed("duty = \"right\"\n").replace("name = \"right\"", "name = \"left\"");
+    assert_says(&fault(&faulty), &["`left` is used twice"]);
+}
+
+#[test]
+fn an_observer_of_one_output_names_none() {
+    let observer = OBSERVER.replace("[[output]]\nname = \"left\"", "[[feature]]\nname = \"e\"");
+    let single = Folder::new().replace("[[feature]]\nname = \"e\"", &observer);
+    assert_says(&single.fault(), &["names one of several outputs", "leave it out"]);
+}
+
+#[test]
+fn a_law_is_refused_with_the_way_out() {
     let law = folder(4).replace(
         "continuous = { squash = \"tanh\", scale = 0.3, offset = 0.5 }",
         "base = \"0.5\", offsets = [-0.1, 0.1]",
@@ -189,11 +236,73 @@ fn a_law_an_observer_and_golden_answers_are_refused_with_the_way_out() {
             .to_string()
             .contains("a law of control has one output")
     );
-    let golden = folder(4).golden(&[common::tensor("obs", &[3, 2]), common::tensor("output", &[3, 4])]);
-    assert_says(
-        &fault(&golden),
-        &["golden answers are compared for one output", "--output N"],
+}
+
+/// Chosen actions as trainers save them.
+fn indices(name: &str, shape: &[usize], list: &[i32]) -> common::Tensor {
+    let data = list.iter().flat_map(|index| index.to_le_bytes()).collect();
+    common::raw_tensor(name, safetensors::Dtype::I32, shape, data)
+}
+
+/// Golden answers of three vectors with these tensors beside `obs`.
+fn with_golden(tensors: &[common::Tensor]) -> Folder {
+    let obs = common::f32_tensor("obs", &[3, 2], &[0.0; 6]);
+    folder(4).golden(&[&[obs], tensors].concat())
+}
+
+#[test]
+fn golden_answers_hold_the_last_layer_and_what_became_of_each_output() {
+    // the choice of left: 0, 2, 1
+    let layer = [1.0, 0.5, 0.0, 4.0, 0.0, 0.5, 1.0, 5.0, -2.0, -1.0, -3.0, 6.0];
+    let layer = common::f32_tensor("output", &[3, 4], &layer);
+    let actions = indices("action_left", &[3], &[0, 2, 1]);
+    let duties = common::f32_tensor("duty_right", &[3], &[0.25, 0.5, 0.75]);
+    let policy = policy(&with_golden(&[layer.clone(), actions.clone(), duties.clone()]));
+    let golden = policy.golden.as_ref().unwrap();
+    assert_eq!((golden.count, golden.q_values.len(), golden.outputs.len()), (3, 12, 2));
+    let paths = policy.paths();
+    let [left, right] = [0, 1].map(|index| golden.of_output(index, &paths[index].columns()));
+    assert_eq!(left.q_values, [1.0, 0.5, 0.0, 0.0, 0.5, 1.0, -2.0, -1.0, -3.0]);
+    assert_eq!((left.action_indices, left.duties), (vec![0, 2, 1], vec![]));
+    assert_eq!(
+        (right.q_values, right.duties),
+        (vec![4.0, 5.0, 6.0], vec![0.25, 0.5, 0.75])
     );
+    // either part is enough, and the last layer may be called as that of a choice
+    let alone = self::policy(&with_golden(&[actions, duties])).golden.unwrap();
+    assert!(alone.q_values.is_empty());
+    let mut named = layer;
+    named.name = "q".to_owned();
+    assert_eq!(self::policy(&with_golden(&[named])).golden.unwrap().q_values.len(), 12);
+}
+
+#[test]
+fn golden_answers_that_leave_an_output_out_or_name_none_are_refused() {
+    let actions = |name: &str, list: &[i32]| indices(name, &[3], list);
+    let layer = |name: &str| common::f32_tensor(name, &[3, 4], &[0.0, 1.0, 0.0, 0.0].repeat(3));
+    let one = fault(&with_golden(&[actions("action_left", &[0, 0, 0])]));
+    assert_says(
+        &one,
+        &["nothing of the outputs right", "`output` f32 [3, 4]", "`duty_right`"],
+    );
+    let misspelt = fault(&with_golden(&[layer("output"), actions("action_lfet", &[1, 1, 1])]));
+    assert_says(
+        &misspelt,
+        &["`action_lfet` is the answer of no output", "did you mean `action_left`"],
+    );
+    let whole = fault(&with_golden(&[layer("output"), actions("action", &[1, 1, 1])]));
+    assert_says(
+        &whole,
+        &["`action` is the answer of no output", "action_left, duty_right"],
+    );
+    let twice = fault(&with_golden(&[layer("output"), layer("q")]));
+    assert_says(&twice, &["hold the last layer twice"]);
+    let other = fault(&with_golden(&[layer("output"), actions("action_left", &[1, 0, 1])]));
+    assert_says(&other, &["row 1", "not the one with the largest q value"]);
+    let beyond = fault(&with_golden(&[layer("output"), actions("action_left", &[1, 3, 1])]));
+    assert_says(&beyond, &["row 1", "0 to 2"]);
+    let narrow = fault(&with_golden(&[common::f32_tensor("output", &[3, 3], &[0.0; 9])]));
+    assert_says(&narrow, &["[3, 3]", "[3, 4]"]);
 }
 
 #[test]

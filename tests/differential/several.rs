@@ -25,7 +25,7 @@ fn random_policies_with_several_outputs_are_equal_in_every_format() {
 }
 
 #[test]
-fn random_policies_with_several_outputs_reach_both_heads_every_limiter_and_two_to_four_outputs() {
+fn random_policies_with_several_outputs_reach_heads_limiters_observers_and_two_to_four_outputs() {
     let policies: Vec<Policy> = (0..60).map(|seed| load(seed).1).collect();
     let outputs = |policy: &Policy| match &policy.head {
         Head::Several(outputs) => outputs.clone(),
@@ -45,6 +45,11 @@ fn random_policies_with_several_outputs_reach_both_heads_every_limiter_and_two_t
         own.iter().any(|output| output.head.is_choice()) && own.iter().any(|output| !output.head.is_choice())
     };
     assert!(policies.iter().filter(mixed).count() > 10);
+    let observers: Vec<_> = policies.iter().flat_map(|policy| policy.observers.clone()).collect();
+    for (output, delay) in [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)] {
+        let is_drawn = |own: &policy::Observer| (own.output, own.compute_delay) == (output, delay);
+        assert!(observers.iter().any(is_drawn), "output {output}, delay {delay}");
+    }
 }
 
 #[test]
@@ -113,4 +118,36 @@ fn planted_defects_in_the_second_output_are_caught() {
         );
         assert!(!report.unwrap().equal(), "{from} -> {to} was not seen");
     }
+}
+
+/// The estimates of a leg that another leg drives would look right as long as both command the same.
+#[test]
+fn an_observer_that_another_output_drives_is_caught() {
+    let (_folder, policy) = (0..60)
+        .map(load)
+        .find(|(_, policy)| policy.observers.first().is_some_and(|observer| observer.output == 1))
+        .expect("a policy whose first observer is driven by the second output");
+    let host = targets::find("host").unwrap();
+    let mut files = codegen::sources(&policy, host, &[codegen::Output::C], None)
+        .unwrap()
+        .files;
+    let names = policy.output_names();
+    let [own, other] = [names[1], names[0]].map(|name| format!("state->previous_command_{name}"));
+    let text = files.get_mut(&format!("{}.c", policy.name)).unwrap();
+    // observers stand before the features: the first value that is made of the command is theirs
+    let line = text
+        .lines()
+        .find(|line| line.starts_with("    const") && line.contains(&own));
+    let line = line.unwrap_or_else(|| panic!("{own}\n{text}")).to_owned();
+    *text = text.replacen(&line, &line.replace(&own, &other), 1);
+    let report = verify::run(
+        &policy,
+        verify::Options {
+            steps: 2000,
+            generated: Some(&files),
+            compilers: vec!["gcc".to_owned()],
+            ..verify::Options::default()
+        },
+    );
+    assert!(!report.unwrap().equal(), "{line}");
 }

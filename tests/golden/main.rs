@@ -38,7 +38,8 @@ fn case_folders() -> Vec<PathBuf> {
 }
 
 fn case(folder: &Path) -> Case {
-    let policy = policy::load(&folder.join("policy.toml")).unwrap_or_else(|faults| panic!("{faults}"));
+    let policy = policy::load_with(&folder.join("policy.toml"), &tests::several::options());
+    let policy = policy.unwrap_or_else(|faults| panic!("{faults}"));
     Case {
         name: folder.file_name().unwrap().to_string_lossy().into_owned(),
         folder: folder.to_owned(),
@@ -237,6 +238,11 @@ fn together_the_cases_hold_every_part_of_a_contract() {
         "compute_delay: 1",
         "Residual(",
         "Still {",
+        "Several([",
+        "OutputDuty(0)",
+        "OutputCommand(1)",
+        "OutputCommand(2)",
+        "output: 1,",
     ];
     let missing: Vec<_> = parts.iter().filter(|part| !shown.contains(**part)).collect();
     assert!(missing.is_empty(), "{missing:?}\n{shown}");

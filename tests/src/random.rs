@@ -149,7 +149,7 @@ const OBSERVER: u64 = 0x6f62_7365_7276_6572;
 
 /// An observer of any form: each circuit and carrier, diode and synchronous leg, delay 0 and 1, input voltage as a number and
 /// as a signal; whether it has a surplus.
-fn observer(text: &mut String, rng: &mut SplitMix, index: usize, signals: usize, period: f64) -> bool {
+pub(crate) fn observer(text: &mut String, rng: &mut SplitMix, index: usize, signals: usize, period: f64) -> bool {
     let (inductance, capacitance) = (period * rng.uniform(1.0, 50.0), period * rng.uniform(0.05, 2.0));
     let low = if rng.one_in(2) { 0.0 } else { rng.uniform(-20.0, -1.0) };
     let source = match rng.one_in(2) {
@@ -220,7 +220,7 @@ fn residual(rng: &mut SplitMix, actions: usize, observers: &[bool], signals: usi
 }
 
 /// A source over estimates of observers, each of which has a surplus or not.
-fn estimate(rng: &mut SplitMix, observers: &[bool], signals: usize) -> String {
+pub(crate) fn estimate(rng: &mut SplitMix, observers: &[bool], signals: usize) -> String {
     let e = |rng: &mut SplitMix| {
         let own = rng.below(observers.len());
         let words = ["current", "voltage", "bias", "surplus"];

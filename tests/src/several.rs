@@ -1,5 +1,5 @@
 //! Policies with several outputs, drawn at random from a seed: choices and continuous heads mixed, each with limits, fallback and,
-//! mostly, a mapping of its own, and features that read the duty of one of them.
+//! mostly, a mapping of its own, features that read the duty of one of them, and in every second policy observers that one of them drives.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use policy::Activation;
 use random::{Random, SplitMix};
 use safetensors::SafeTensorError;
 
-use crate::random::{Folder, action_table, continuous, feature, source, weights};
+use crate::random::{Folder, action_table, continuous, estimate, feature, observer, source, weights};
 
 /// Names of the outputs, as many as are drawn.
 const NAMES: [&str; 4] = ["left", "right", "mid", "spare"];
@@ -43,7 +43,13 @@ fn files(seed: u64) -> Result<(String, Files), SafeTensorError> {
     let count = 2 + rng.below(3);
     let hidden: Vec<usize> = (0..1 + rng.below(3)).map(|_| 1 + rng.below(30)).collect();
     let signals = 1 + rng.below(4);
-    let mut text = top(&mut rng, seed, signals);
+    let (mut text, period) = top(&mut rng, seed, signals);
+    // from a stream of its own, so that the rest of the policy stays what it was
+    let mut beside = SplitMix::new(seed ^ OBSERVER);
+    let observers = if beside.one_in(2) { 1 + beside.below(2) } else { 0 };
+    let observers: Vec<bool> = (0..observers)
+        .map(|index| driven(&mut text, &mut beside, (index, &NAMES[..count]), signals, period))
+        .collect();
     for index in 0..features {
         let own = source(&mut rng, signals);
         let own = NAMES[..count].iter().fold(own, |own, _| {
@@ -60,7 +66,8 @@ fn files(seed: u64) -> Result<(String, Files), SafeTensorError> {
                 None => own,
             }
         });
-        feature(&mut text, &mut rng, index, &own);
+        let observed = (!observers.is_empty() && !beside.one_in(3)).then(|| estimate(&mut beside, &observers, signals));
+        feature(&mut text, &mut rng, index, &observed.unwrap_or(own));
     }
     // one output always reads what another one commanded
     text += &format!(
@@ -88,11 +95,29 @@ fn files(seed: u64) -> Result<(String, Files), SafeTensorError> {
     Ok((text, files))
 }
 
-/// Name, period, parameters and signals.
-fn top(rng: &mut SplitMix, seed: u64, signals: usize) -> String {
+/// Bits in which the seed of the observers' stream differs from that of the rest.
+const OBSERVER: u64 = 0x6f62_735f_6475_7479;
+
+/// An observer that is driven by one of these outputs; whether it has a surplus.
+fn driven(
+    text: &mut String,
+    rng: &mut SplitMix,
+    (index, outputs): (usize, &[&str]),
+    signals: usize,
+    period: f64,
+) -> bool {
+    let mut own = String::new();
+    let has_surplus = observer(&mut own, rng, index, signals, period);
+    let duty = format!("duty = \"{}\"\ncompute_delay", outputs[rng.below(outputs.len())]);
+    *text += &own.replacen("compute_delay", &duty, 1);
+    has_surplus
+}
+
+/// Name, period, parameters and signals, and the period in seconds.
+fn top(rng: &mut SplitMix, seed: u64, signals: usize) -> (String, f64) {
+    let period = rng.uniform(1e-5, 1e-3);
     let mut text = format!(
-        "name = \"several{seed}\"\nsample_period = {:?}\n\n[parameters]\nk1 = {:?}\nk2 = {:?}\n\n",
-        rng.uniform(1e-5, 1e-3),
+        "name = \"several{seed}\"\nsample_period = {period:?}\n\n[parameters]\nk1 = {:?}\nk2 = {:?}\n\n",
         rng.uniform(-3.0, 3.0),
         rng.uniform(0.5, 2.0)
     );
@@ -104,7 +129,7 @@ fn top(rng: &mut SplitMix, seed: u64, signals: usize) -> String {
             low + rng.uniform(1.0, 200.0)
         );
     }
-    text
+    (text, period)
 }
 
 /// An output and the columns that it takes.

@@ -140,13 +140,17 @@ fn what_it_changes(policy: &Policy, format: NumericFormat) -> String {
     match found {
         None => "; `policyc certify` says what it does to the decision".to_owned(),
         Some(decisions) => {
-            let what = match &decisions {
-                Decisions::Choice(choices) => {
-                    format!("{} of {} golden decisions", choices.changed, choices.observations)
+            let what = decisions.beyond().map(|(output, own)| {
+                let of = output.map_or_else(String::new, |name| format!(" of {name}"));
+                match own {
+                    Decisions::Choice(choices) => {
+                        format!("{} of {} golden decisions{of}", choices.changed, choices.observations)
+                    }
+                    Decisions::Schedule(_) => format!("golden gains{of}"),
+                    Decisions::Continuous(_) | Decisions::Several(_) => format!("golden duties{of}"),
                 }
-                Decisions::Continuous(_) => "golden duties".to_owned(),
-                Decisions::Schedule(_) => "golden gains".to_owned(),
-            };
+            });
+            let what = what.collect::<Vec<_>>().join(", ");
             format!(
                 "; it changes {what}, more than allowed, and is refused without `{}`",
                 decisions.remedy()

@@ -88,35 +88,40 @@ fn accepted(policy: &Policy, golden_decisions: Option<f64>) -> Result<Vec<String
     match decisions(policy, golden_decisions) {
         None => Ok(Vec::new()),
         Some(decisions) if decisions.kept() => {
-            let changes = match &decisions {
+            let changes = |own: &Decisions| match own {
                 Decisions::Choice(choices) => choices.changed > 0,
-                Decisions::Continuous(_) | Decisions::Schedule(_) => policy.numeric_format.is_integer(),
+                _ => policy.numeric_format.is_integer(),
             };
             // the counts; where it changes most is told by `inspect`
-            let mut lines = text::decisions(policy, &decisions);
-            lines.truncate(2);
+            let told = |(output, own): (Option<&str>, &Decisions)| {
+                let lines = text::of_output(policy, output, own);
+                lines.into_iter().take(if changes(own) { 2 } else { 0 })
+            };
+            let mut lines: Vec<String> = decisions.each().into_iter().flat_map(told).collect();
+            if lines.is_empty() {
+                return Ok(lines);
+            }
             lines.extend(accepted_here(policy, golden_decisions));
-            Ok(if changes { lines } else { Vec::new() })
+            Ok(lines)
         }
         Some(decisions) => {
             let remedy = decisions.remedy();
-            let (problem, hint) = match &decisions {
-                Decisions::Choice(choices) => (
-                    "the numeric format changes more of the trainer's decisions than allowed; nothing was written",
-                    format!(
-                        "see what they cost with `policyc certify` and `policyc simulate`; to accept them, {remedy} in \
-                         [network] of the contract, which `verify` reads too, or --golden-decisions {} for this run",
-                        choices.accepting_share()
-                    ),
+            let what = decisions.beyond().next().map(|(_, own)| own);
+            let problem = match what {
+                Some(Decisions::Continuous(_)) => {
+                    "the numeric format changes the trainer's duties more than allowed; nothing was written"
+                }
+                Some(Decisions::Schedule(_)) => {
+                    "the numeric format changes the trainer's gains more than allowed; nothing was written"
+                }
+                _ => "the numeric format changes more of the trainer's decisions than allowed; nothing was written",
+            };
+            let hint = match decisions.accepting_share() {
+                Some(share) => format!(
+                    "see what they cost with `policyc certify` and `policyc simulate`; to accept them, {remedy} in \
+                     [network] of the contract, which `verify` reads too, or --golden-decisions {share} for this run"
                 ),
-                Decisions::Continuous(_) => (
-                    "the numeric format changes the trainer's duties more than allowed; nothing was written",
-                    of_numbers(&remedy),
-                ),
-                Decisions::Schedule(_) => (
-                    "the numeric format changes the trainer's gains more than allowed; nothing was written",
-                    of_numbers(&remedy),
-                ),
+                None => of_numbers(&remedy),
             };
             let found = text::decisions(policy, &decisions).join("\n");
             Err(Message::new(problem).found(found).hint(hint))

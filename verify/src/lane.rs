@@ -71,10 +71,8 @@ impl<'a> Lane<'a> {
             Err(error) => &error.received,
         };
         if let Some(known) = &self.policy.golden {
-            self.golden = Some(GoldenResult {
-                rounded: self.policy.numeric_format.is_integer(),
-                ..golden::judge(known, self.layout.scalar(), &self.policy.head, words)
-            });
+            let result = golden::judge(known, self.layout.scalar(), &self.policy.head, words);
+            self.golden = Some(result.told(self.policy.numeric_format.is_integer()));
         }
         self.judge(chunk, answer)
     }

@@ -8,7 +8,7 @@ use interp::decisions::{Choices, Decisions};
 use interp::duties::Duties;
 use interp::gains::Gains;
 use interp::golden::{GoldenResult, UNPROVEN};
-use policy::Policy;
+use policy::{Head, Policy};
 use report::{grouped, quantity};
 use toml_input::Message;
 
@@ -86,19 +86,9 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
     // the decisions of a network that was read wrongly say nothing about its format
     if let Some(decisions) = report.decisions.as_ref().filter(|decisions| read && !decisions.kept()) {
         let (policy, format) = (&report.policy, decisions.numeric_format());
-        match decisions {
-            Decisions::Choice(_) => writeln!(
-                out,
-                "DIFFERENT: {policy} in {format} decides otherwise than its trainer's network more often than allowed"
-            )?,
-            Decisions::Continuous(_) => writeln!(
-                out,
-                "DIFFERENT: {policy} in {format} commands other duties than its trainer's network by more than allowed"
-            )?,
-            Decisions::Schedule(_) => writeln!(
-                out,
-                "DIFFERENT: {policy} in {format} sets other gains than its trainer's network by more than allowed"
-            )?,
+        for (output, own) in decisions.beyond() {
+            let whose = output.map_or_else(String::new, |name| format!("output {name} of "));
+            writeln!(out, "DIFFERENT: {whose}{policy} in {format} {}", beyond(own))?;
         }
         writeln!(out, "  = hint: {}", accepting(decisions))?;
     }
@@ -108,13 +98,9 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
 /// How what a format changes is accepted.
 // a folder does not say what is accepted: whoever can edit generated files would accept for whoever verifies them
 fn accepting(decisions: &Decisions) -> String {
-    let once = match decisions {
-        Decisions::Choice(choices) => format!(
-            ", or for this run --golden-decisions {} (a folder does not carry what `compile` was told)",
-            choices.accepting_share()
-        ),
-        Decisions::Continuous(_) | Decisions::Schedule(_) => String::new(),
-    };
+    let once = decisions.accepting_share().map_or_else(String::new, |share| {
+        format!(", or for this run --golden-decisions {share} (a folder does not carry what `compile` was told)")
+    });
     format!(
         "to accept them for good: {} in [network] of the contract{once}",
         decisions.remedy()
@@ -125,10 +111,35 @@ fn accepting(decisions: &Decisions) -> String {
 /// shares of the operating range of Q, duties 0..1.
 #[must_use]
 pub fn decisions(policy: &Policy, decisions: &Decisions) -> Vec<String> {
-    match decisions {
-        Decisions::Choice(decisions) => choices(policy, decisions),
+    let each = decisions.each().into_iter();
+    each.flat_map(|(output, own)| of_output(policy, output, own)).collect()
+}
+
+/// The same of one output of several, by its name; of the only one without.
+pub(crate) fn of_output(policy: &Policy, output: Option<&str>, decisions: &Decisions) -> Vec<String> {
+    let paths = policy.paths();
+    let path = paths.iter().find(|path| path.name == output);
+    let head = path.map_or(&policy.head, |path| path.head);
+    let mut lines = match decisions {
+        Decisions::Choice(decisions) => choices(policy, head, decisions),
         Decisions::Continuous(duties) => self::duties(policy, duties),
         Decisions::Schedule(gains) => self::gains(policy, gains),
+        Decisions::Several(_) => self::decisions(policy, decisions),
+    };
+    if let (Some(name), Some(first)) = (output, lines.first_mut()) {
+        *first = format!("{name}: {first}");
+    }
+    lines
+}
+
+/// What is said of a format that changes more than allowed.
+fn beyond(decisions: &Decisions) -> &'static str {
+    match decisions {
+        Decisions::Continuous(_) => "commands other duties than its trainer's network by more than allowed",
+        Decisions::Schedule(_) => "sets other gains than its trainer's network by more than allowed",
+        Decisions::Choice(_) | Decisions::Several(_) => {
+            "decides otherwise than its trainer's network more often than allowed"
+        }
     }
 }
 
@@ -200,7 +211,7 @@ fn place(policy: &Policy, observation: &[f32]) -> String {
     place.join(", ")
 }
 
-fn choices(policy: &Policy, decisions: &Choices) -> Vec<String> {
+fn choices(policy: &Policy, head: &Head, decisions: &Choices) -> Vec<String> {
     let Choices {
         numeric_format,
         observations,
@@ -230,15 +241,11 @@ fn choices(policy: &Policy, decisions: &Choices) -> Vec<String> {
         quantity(*mean_loss, "", 3),
         quantity(*operating_range, "", 3)
     ));
-    let duty = |action: usize| policy.actions().get(action).map_or(f64::NAN, |action| action.duty);
+    let duty = |action: usize| head.actions().get(action).map_or(f64::NAN, |action| action.duty);
     lines.push(format!(
         "  most at golden vector {}: {} {} becomes {}, at {}",
         change.row,
-        if policy.head.residual().is_some() {
-            "offset"
-        } else {
-            "duty"
-        },
+        if head.residual().is_some() { "offset" } else { "duty" },
         duty(change.expected),
         duty(change.found),
         place(policy, &change.observation)

@@ -38,6 +38,10 @@ pub struct New {
     /// out, and named
     #[arg(long, value_name = "N", conflicts_with = "gains")]
     pub output: Option<usize>,
+    /// Columns of each of several duties in the order of the last layer, where the file does not say what its outputs are: 1 is a duty as a
+    /// number, N a choice among N duties
+    #[arg(long, value_name = "N,N", value_delimiter = ',', conflicts_with_all = ["gains", "output"])]
+    pub outputs: Vec<usize>,
     /// The outputs are the gains of a law of control, which the contract says: `gains` in [actions]
     #[arg(long)]
     pub gains: bool,

@@ -40,6 +40,7 @@ fn for_weights(options: &New, weights: &Path) -> Result<Outcome, Failure> {
     let known = import::Options {
         actions: options.actions,
         output: options.output,
+        outputs: options.outputs.clone(),
         gains: options.gains,
         inside: options.inside.clone(),
         vecnormalize: options.vecnormalize.clone(),

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! In: the observers of a policy. Out: values of the block in front of the features, and what `commit` pushes. The one
-//! invariant: both orders need the state's `previous_command` alone, so no observer waits for the network.
+//! invariant: both orders need `previous_command` of one output alone, so no observer waits for the network.
 
 use policy::{Circuit, Estimate, Hold, InputVoltage, Observer, OnTime};
 
@@ -33,7 +33,7 @@ impl Builder {
         let first = self.reserve(observer.words());
         let kept = [0, 1, 2].map(|word| self.block.value(Op::Memory(first + word)));
         let now = Drive {
-            duty: self.block.value(Op::PreviousCommand(0)),
+            duty: self.block.value(Op::PreviousCommand(observer.output)),
             load_current: self.signals[observer.load_current],
             input_voltage: self.input_voltage(observer, None),
         };

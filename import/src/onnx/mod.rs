@@ -18,8 +18,9 @@ use policy::{Activation, DraftFeature};
 use toml_input::{FileName, Message};
 
 use crate::activations;
-use crate::actor::{self, Actor, Squash};
+use crate::actor::{self, Actor, Duty, Squash};
 use crate::network::{Layer, Network};
+use command::Commands;
 use model::{Constant, Graph, Node};
 
 /// What a graph computes.
@@ -34,6 +35,8 @@ pub(crate) struct Model {
     pub actor: Option<Actor>,
     /// Each command, where the outputs are gains.
     pub commands: Vec<Actor>,
+    /// Each command, where each is a duty of its own.
+    pub several: Vec<Duty>,
 }
 
 /// Whether `bytes` begin as a model does: field 1, the version of the format, and no header of safetensors.
@@ -166,7 +169,7 @@ impl Walk<'_> {
                 Ok(())
             }
             // PPO's mean, clipped to its action space
-            "Clip" if self.activations.last() == Some(&None) && self.is_one() && self.cut.is_none() => {
+            "Clip" if self.activations.last() == Some(&None) && self.is_few() && self.cut.is_none() => {
                 self.cut = Some(self.ends(node).ok_or_else(|| unknown(node))?);
                 Ok(())
             }
@@ -332,7 +335,7 @@ impl Walk<'_> {
             inputs.ok_or_else(|| other("the graph holds no dense layer", "none", "Gemm, or MatMul and Add"))?;
         let actor = match self.activations.pop() {
             Some(Some(last)) if Squash::curve(last).is_some() => {
-                if !self.is_one() {
+                if !self.is_few() {
                     return Err(actor::several(self.outputs()));
                 }
                 Some(Actor {
@@ -349,43 +352,16 @@ impl Walk<'_> {
             }
             _ => self.cut.map(|(low, high)| Actor::clipped(low, high)),
         };
-        let of = |output: usize| {
-            actor.map(|actor| Actor {
-                affine: Some(actor::scaled(self.affine_of(output))),
-                ..actor
-            })
-        };
-        let commands = (0..self.outputs())
-            .filter_map(|output| of(output).filter(|_| self.gains))
-            .collect();
-        let actor = of(self.picked.unwrap_or(0));
+        self.no_choice_behind(actor)?;
+        let Commands {
+            one: actor,
+            gains: commands,
+            several,
+        } = self.commands(actor);
         let names: Vec<&str> = self.layers.iter().map(|layer| layer.name.as_str()).collect();
         self.said
             .insert(0, format!("layers, first to last: {}", names.join(" > ")));
-        let mut features = Vec::new();
-        if self.affine.is_some() || self.clip.is_some() {
-            let (scales, offsets) = self.affine.unwrap_or((vec![1.0], vec![0.0]));
-            let (scales, offsets) = spread(&scales, inputs).zip(spread(&offsets, inputs)).ok_or_else(|| {
-                other(
-                    "the normalisation has another length than the observation",
-                    &scales.len().to_string(),
-                    &inputs.to_string(),
-                )
-            })?;
-            let clip = self.clip.map(|(low, high)| (low, high, "Clip of the graph".to_owned()));
-            features = scales
-                .into_iter()
-                .zip(offsets)
-                .map(|affine| DraftFeature {
-                    affine: Some(affine),
-                    clip: clip.clone(),
-                    ..DraftFeature::default()
-                })
-                .collect();
-            self.said.push(
-                "the normalisation of the graph is scale, offset and clip of the features, computed in f64".to_owned(),
-            );
-        }
+        let features = self.features(inputs)?;
         let mut network = Network {
             layers: self.layers,
             plain: false,
@@ -406,7 +382,33 @@ impl Walk<'_> {
             features,
             actor,
             commands,
+            several,
         })
+    }
+
+    /// What stands before the first layer.
+    fn features(&mut self, inputs: usize) -> Result<Vec<DraftFeature>, Message> {
+        if self.affine.is_none() && self.clip.is_none() {
+            return Ok(Vec::new());
+        }
+        let (scales, offsets) = self.affine.take().unwrap_or((vec![1.0], vec![0.0]));
+        let (scales, offsets) = spread(&scales, inputs).zip(spread(&offsets, inputs)).ok_or_else(|| {
+            other(
+                "the normalisation has another length than the observation",
+                &scales.len().to_string(),
+                &inputs.to_string(),
+            )
+        })?;
+        let clip = self.clip.map(|(low, high)| (low, high, "Clip of the graph".to_owned()));
+        self.said.push(
+            "the normalisation of the graph is scale, offset and clip of the features, computed in f64".to_owned(),
+        );
+        let feature = |affine| DraftFeature {
+            affine: Some(affine),
+            clip: clip.clone(),
+            ..DraftFeature::default()
+        };
+        Ok(scales.into_iter().zip(offsets).map(feature).collect())
     }
 }
 

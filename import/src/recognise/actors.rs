@@ -17,6 +17,8 @@ use crate::network::no_output;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Definition {
     pub actor: Actor,
+    /// Scale and offset of each of several commands, where the tensors say them.
+    pub each: Vec<(f64, f64)>,
     /// What follows from whose definition, for the user to confirm.
     pub said: Vec<String>,
     /// The activation behind the hidden layers as TOML, with a comment.
@@ -116,6 +118,7 @@ pub(crate) fn find(tensors: &[&NamedTensor], known: &Known) -> Result<Option<Def
     let said = match known {
         Known { gains: true, .. } => Some("by --gains"),
         Known { output: Some(_), .. } => Some("by --output"),
+        Known { are_commands: true, .. } => Some("by --outputs"),
         Known { actions: Some(1), .. } => Some("by --actions 1"),
         Known { .. } => None,
     };
@@ -125,6 +128,7 @@ pub(crate) fn find(tensors: &[&NamedTensor], known: &Known) -> Result<Option<Def
 fn defined(squash: Squash, affine: Option<(f64, f64)>, said: &str) -> Definition {
     Definition {
         actor: Actor { squash, affine },
+        each: Vec::new(),
         said: vec![said.to_owned()],
         activation: None,
         is_mean_of_two: false,
@@ -157,6 +161,7 @@ fn cleanrl(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refus
         );
         return Ok(Some(Definition {
             activation: fixed("relu", "CleanRL's definition"),
+            each: pairs(scale, bias).collect(),
             ..defined(TANH, own(scale, known)?.zip(own(bias, known)?), &said)
         }));
     }
@@ -178,16 +183,22 @@ fn cleanrl(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refus
     Ok(Some(definition))
 }
 
-/// The number of the one command, or of the one that is picked; `None` of several gains, which the contract lists.
+/// The number of the one command, or of the one that is picked; `None` of several, of which [`pairs`] has each.
 fn own(tensor: &NamedTensor, known: &Known) -> Result<Option<f64>, Refusal> {
     let values = tensor.values.as_deref().unwrap_or_default();
     match (values, known.output) {
         ([one], _) => Ok(Some(actor::short(*one))),
         (several, Some(output)) if output < several.len() => Ok(several.get(output).copied().map(actor::short)),
         (several, Some(output)) => Err(Refusal::of(&tensor.name, no_output(output, several.len()))),
-        (_, None) if known.gains => Ok(None),
-        (_, None) => Err(Refusal::of(&tensor.name, actor::several(tensor.shape.iter().product()))),
+        (_, None) => Ok(None),
     }
+}
+
+/// The numbers of each command in two tensors.
+fn pairs(first: &NamedTensor, second: &NamedTensor) -> impl Iterator<Item = (f64, f64)> {
+    let values = |tensor: &NamedTensor| tensor.values.clone().unwrap_or_default();
+    let both = values(first).into_iter().zip(values(second));
+    both.map(|(first, second)| (actor::short(first), actor::short(second)))
 }
 
 fn stable_baselines(names: &Names<'_>) -> Result<Option<Definition>, Refusal> {
@@ -240,7 +251,7 @@ fn tianshou(names: &Names<'_>, known: &Known) -> Option<Definition> {
         });
     }
     let outputs = names.outputs("last.model");
-    let is_said = outputs.is_some() && (known.output.is_some() || known.gains);
+    let is_said = outputs.is_some() && (known.is_said());
     let is_one = is_said || outputs == Some(1) && known.actions.is_none_or(|actions| actions == 1);
     let said = "Tianshou's ContinuousActorDeterministic (TD3, DDPG) by the names of its tensors: the action is max_action * tanh(last), which is \
                 scaled to the action space";
@@ -256,7 +267,7 @@ fn rllib(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refusal
     };
     let is_free = names.leaf("log_std").is_some();
     let is_command = is_free || known.actions == Some(1);
-    let is_said = known.output.is_some() || known.gains;
+    let is_said = known.is_said();
     if outputs == 2 && !is_free && known.actions.is_none() && !is_said {
         return Err(two_or_one("pi.net.mlp"));
     }
@@ -307,6 +318,9 @@ fn torchrl(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refus
         let said = "TorchRL's TanhModule by the names of its tensors: the action is a tanh from action_low to action_high. Is that your definition?";
         return Ok(Some(Definition {
             activation,
+            each: pairs(low, high)
+                .filter_map(|(low, high)| Actor::of_space(low, high).affine)
+                .collect(),
             ..defined(actor.squash, actor.affine, said)
         }));
     }
@@ -314,7 +328,7 @@ fn torchrl(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refus
         return Ok(None);
     }
     match known.actions {
-        None if known.output.is_some() || known.gains => Ok(None),
+        None if known.is_said() => Ok(None),
         None => Err(two_or_one("module.0.module")),
         Some(1) => {
             let said = "TorchRL's NormalParamExtractor by --actions 1: the first of two outputs is the mean, which a TanhNormal squashes by tanh and a \

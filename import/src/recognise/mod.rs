@@ -63,8 +63,17 @@ pub(crate) struct Known {
     pub output: Option<usize>,
     /// The outputs are gains.
     pub gains: bool,
+    /// Each output is a command of its own.
+    pub are_commands: bool,
     /// Epsilon of the batch norms by their names, where the file says it.
     pub epsilons: Vec<(String, f64)>,
+}
+
+impl Known {
+    /// Whether somebody said what the outputs are.
+    fn is_said(&self) -> bool {
+        self.output.is_some() || self.gains || self.are_commands
+    }
 }
 
 /// What a set of tensors is.
@@ -134,8 +143,12 @@ fn actor(own: &[&NamedTensor], known: &Known, definition: Definition) -> Result<
         network.keep_output(output)?;
     }
     let outputs = network.layers.last().map_or(0, |layer| layer.outputs);
-    if outputs != 1 && !known.gains {
-        return Err(crate::actor::several(outputs).into());
+    if !known.gains {
+        // means and deviations side by side would otherwise pass for as many commands
+        if let (Some(said), true) = (known.actions, outputs > 1) {
+            crate::duties::as_many(outputs, said)?;
+        }
+        crate::duties::fits(outputs)?;
     }
     sizes(&network)?;
     network.definition = Some(definition);

@@ -1,6 +1,6 @@
 //! Continuous actors as bare state dicts: what the names fix, what the library's definition adds, and what stays open.
 
-use super::{Actor, Refused, Row, Tensors, dense, ending, named, names, row, with};
+use super::{Actor, Refused, Row, Several, Tensors, dense, ending, named, names, row, with};
 
 pub fn rows() -> Vec<Row> {
     [
@@ -31,6 +31,11 @@ fn cleanrl() -> Vec<Row> {
         "CleanRL's td3_continuous_action.py",
         "Is that your definition?",
     ]));
+    let several_parts: &[&str] = &[
+        "3 outputs for 3 duties",
+        "CleanRL's td3_continuous_action.py",
+        "name = \"u2\"",
+    ];
     let sac = ["fc1", "fc2", "fc_mean"];
     let sac_parts: &[&str] = Box::leak(Box::new([relu, squash, "CleanRL's sac_continuous_action.py"]));
     let deviation = dense("fc_logstd", 1, 16);
@@ -61,7 +66,7 @@ fn cleanrl() -> Vec<Row> {
         row(
             "CleanRL TD3, three commands",
             with(ending(fc, 3), several),
-            Refused(&["commands several numbers", "3 outputs", "--output N", "--gains"]),
+            Several(names(fc), several_parts),
         ),
         row(
             "CleanRL SAC",
@@ -84,7 +89,10 @@ fn cleanrl() -> Vec<Row> {
         row(
             "CleanRL PPO, two commands",
             ppo(2),
-            Refused(&["commands several numbers"]),
+            Several(
+                names(mean),
+                &["clip = [\"TODO\", \"TODO\"] }", "2 outputs for 2 duties"],
+            ),
         ),
     ]
 }
@@ -170,7 +178,7 @@ fn stable_baselines() -> Vec<Row> {
     };
     let ppo_parts: &[&str] = &["continuous = { clip = [\"TODO\", \"TODO\"] }", "# tanh unless you gave"];
     vec![
-        row("SB3 SAC actor", sac("", 1), Actor(stems, sac_parts)),
+        row("SB3 SAC actor", sac("", 1), Actor(stems.clone(), sac_parts)),
         row(
             "SB3 SAC policy",
             [sac("actor.", 1), critics.clone()].concat(),
@@ -179,7 +187,10 @@ fn stable_baselines() -> Vec<Row> {
         row(
             "SB3 SAC, two commands",
             sac("", 2),
-            Refused(&["commands several numbers"]),
+            Several(
+                stems.clone(),
+                &["squash = \"tanh\", scale = \"TODO\"", "2 outputs for 2 duties"],
+            ),
         ),
         row(
             "SB3 SAC with use_sde",
@@ -260,7 +271,7 @@ fn tianshou() -> Vec<Row> {
         row(
             "Tianshou SAC, two commands",
             [ending(mean, 2), dense("sigma.model.0", 2, 16)].concat(),
-            Refused(&["commands several numbers"]),
+            Several(names(mean), &["squash = \"TODO\"", "2 outputs for 2 duties"]),
         ),
         row(
             "Tianshou SAC, the first of two commands",
@@ -326,7 +337,7 @@ fn rllib() -> Vec<Row> {
         row(
             "RLlib PPO, two commands",
             ppo(4),
-            Refused(&["commands several numbers"]),
+            Refused(&["than --actions says", "4 outputs", "--output N"]),
         )
         .actions(1),
     ]
@@ -348,7 +359,7 @@ fn torchrl() -> Vec<Row> {
         row(
             "TorchRL TD3, two commands",
             with(ending(stems, 2), two_ends),
-            Refused(&["commands several numbers"]),
+            Several(names(stems), &["TorchRL's TanhModule", "2 outputs for 2 duties"]),
         ),
         row(
             "TorchRL TD3, the first of two commands",

@@ -26,10 +26,12 @@ enum Becomes {
     Doubted(Vec<String>, &'static str),
     /// Weights of its own of a continuous actor, and parts of the text of its contract.
     Actor(Vec<String>, &'static [&'static str]),
+    /// The same of an actor with several commands, each an output of its own.
+    Several(Vec<String>, &'static [&'static str]),
     /// Parts of the message, which also has a way out.
     Refused(&'static [&'static str]),
 }
-use Becomes::{Actor, Doubted, Joined, Plain, Refused};
+use Becomes::{Actor, Doubted, Joined, Plain, Refused, Several};
 
 struct Row {
     name: &'static str,
@@ -112,7 +114,7 @@ fn check(row: &Row) {
             return;
         }
         Plain(stems) => (stems, true),
-        Joined(stems) | Doubted(stems, _) | Actor(stems, _) => (stems, false),
+        Joined(stems) | Doubted(stems, _) | Actor(stems, _) | Several(stems, _) => (stems, false),
     };
     let new = new.unwrap_or_else(|faults| panic!("{name}: {faults}"));
     assert_eq!(new.beside.is_empty(), is_plain, "{name}: {:?}", new.said);
@@ -123,6 +125,9 @@ fn check(row: &Row) {
     }
     let is_actor = matches!(row.becomes, Actor(..));
     assert_eq!(policy.head.continuous().is_some(), is_actor, "{name}");
+    let outputs = policy.paths();
+    let is_several = outputs.len() > 1 && outputs.iter().all(|path| path.head.continuous().is_some());
+    assert_eq!(is_several, matches!(row.becomes, Several(..)), "{name}");
     if let Doubted(_, doubt) = row.becomes {
         assert!(
             new.said.iter().any(|line| line.contains(doubt)),
@@ -130,7 +135,7 @@ fn check(row: &Row) {
             new.said
         );
     }
-    if let Actor(_, parts) = row.becomes {
+    if let Actor(_, parts) | Several(_, parts) = row.becomes {
         for part in parts {
             assert!(new.contract.contains(part), "{name}: {part}\n{}", new.contract);
         }

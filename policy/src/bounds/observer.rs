@@ -43,7 +43,7 @@ pub(crate) fn observer(observer: &Observer, inputs: &Inputs, period: f64) -> Res
             InputVoltage::Signal(index) => signal(index)?,
         },
         load: signal(observer.load_current)?,
-        duty: inputs.previous_command,
+        duty: inputs.command(observer.output)?,
         by_current: period / observer.inductance,
         by_voltage: period / observer.capacitance,
     };

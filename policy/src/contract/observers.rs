@@ -23,6 +23,18 @@ pub(crate) struct Observers<'a> {
 pub(crate) struct Surroundings<'a> {
     pub names: &'a [String],
     pub signals: &'a [Option<Signal>],
+    pub duties: Duties<'a>,
+}
+
+/// The duties that can drive an observer.
+#[derive(Clone, Copy)]
+pub(crate) enum Duties<'a> {
+    /// There is one, and no name for it.
+    One,
+    /// Names of several outputs.
+    Named(&'a [String]),
+    /// The list of outputs is faulty, and has left its fault.
+    Unknown,
 }
 
 impl Observers<'_> {
@@ -104,6 +116,7 @@ fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &
     let compute_delay = section
         .required("compute_delay", hint, faults)
         .and_then(|value| value.integer(0..=1, faults));
+    let output = driven(item, &mut section, around.duties, faults);
     let gains = gains(&mut section, faults);
     let hint = "what the estimated current is clamped to, in A: `current = [0.0, 20.0]` with a diode, from a negative current with a synchronous leg";
     let current = section
@@ -133,11 +146,43 @@ fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &
         output_voltage,
         load_current,
         compute_delay: compute_delay?,
+        output: output?,
         gains: gains?,
         current,
         voltage: around.signals.get(output_voltage)?.as_ref()?.range,
         bias: bias?,
     })
+}
+
+/// The output whose duty drives it; the only one without being named.
+fn driven(item: &Value<'_>, section: &mut Table<'_>, duties: Duties<'_>, faults: &mut Sink) -> Option<usize> {
+    let written = section.optional("duty");
+    let text = match &written {
+        Some(value) => Some(value.text(faults)?),
+        None => None,
+    };
+    match (duties, written, text) {
+        (Duties::One, None, _) => Some(0),
+        (Duties::One, Some(value), _) => {
+            faults.push(value.fault(catalogue::one_duty()));
+            None
+        }
+        (Duties::Unknown, ..) => None,
+        (Duties::Named(names), Some(value), Some(text)) => {
+            let found = names.iter().position(|name| name == text);
+            // the name that is meant may be the faulty one, which has left its fault
+            let is_whole = names.iter().all(|name| !name.is_empty());
+            if found.is_none() && is_whole {
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                faults.push(value.fault(catalogue::unknown_name("output", text, &names)));
+            }
+            found
+        }
+        (Duties::Named(names), ..) => {
+            faults.push(item.fault(catalogue::whose_duty(names)));
+            None
+        }
+    }
 }
 
 /// The observer's name, if none of those of its estimates is taken.

@@ -28,6 +28,14 @@ pub(crate) struct Outputs<'a> {
     list: Vec<(Value<'a>, Table<'a>, Option<String>)>,
 }
 
+impl Outputs<'_> {
+    /// Their names in the order of the list, empty where one is not fit.
+    pub fn names(&self) -> Vec<String> {
+        let names = self.list.iter().map(|(.., name)| name.clone().unwrap_or_default());
+        names.collect()
+    }
+}
+
 /// What the outputs are, as far as it could be read.
 pub(crate) struct Read {
     /// All of them; `None` if one is faulty.

@@ -49,6 +49,7 @@ pub fn observers(policy: &Policy) -> String {
     }
     let mut out = "\nobservers (estimates stand beside the signals)\n".to_owned();
     let name = |index: usize| Input::Signal(index).name(&policy.signals, &policy.observers);
+    let paths = policy.paths();
     for (index, own) in policy.observers.iter().enumerate() {
         let source = match own.input_voltage {
             InputVoltage::Constant(volts) => format!("{volts} V"),
@@ -58,8 +59,12 @@ pub fn observers(policy: &Policy) -> String {
             0 => "the duty acts in the same period",
             _ => "the duty acts one period later",
         };
+        let whose = match paths.get(own.output).and_then(|path| path.name) {
+            Some(name) => format!("driven by {name}, "),
+            None => String::new(),
+        };
         out += &format!(
-            "  {}: {}L {} H, C {} F, V {source}, corrected by {}, loaded by {}; {delay}\n",
+            "  {}: {whose}{}L {} H, C {} F, V {source}, corrected by {}, loaded by {}; {delay}\n",
             own.name,
             circuit(own),
             own.inductance,

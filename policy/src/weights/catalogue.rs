@@ -188,6 +188,30 @@ pub(crate) fn golden_continuous(rows: usize, outputs: usize) -> Message {
         )
 }
 
+pub(crate) fn golden_several([rows, columns]: [usize; 2], each: &str, silent: &[&str]) -> Message {
+    Message::new(format!("golden vectors say nothing of the outputs {}", silent.join(", ")))
+        .expected(format!("`output` f32 [{rows}, {columns}], the network's last layer, or {each}, [{rows}] each"))
+        .hint(
+            "action_NAME holds the chosen action of an output, duty_NAME what the trainer's actor asks for, as a duty; output is the last \
+             layer as it is, before argmax, squash or clip",
+        )
+}
+
+pub(crate) fn golden_layer_twice() -> Message {
+    Message::new("golden vectors hold the last layer twice")
+        .found("`output` and `q`")
+        .expected("one of them")
+}
+
+pub(crate) fn golden_stranger(name: &str, known: &[String]) -> Message {
+    Message::new(format!(
+        "the tensor `{}` is the answer of no output",
+        name.escape_debug()
+    ))
+    .expected(format!("one of {}", known.join(", ")))
+    .did_you_mean(name, known.iter().map(String::as_str))
+}
+
 pub(crate) fn golden_law(text: &str) -> Message {
     Message::new("the golden duties cannot be held against the law: an observation does not tell all that it reads")
         .found(format!(

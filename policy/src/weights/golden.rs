@@ -1,5 +1,8 @@
 //! Known answers from the trainer: `obs` [n, features] with `q` [n, actions] and `action` [n] of a choice, or with `output` [n]
-//! and `duty` [n] of a continuous head, or with `output` [n, gains] and `duty` [n] of a gain schedule.
+//! and `duty` [n] of a continuous head, or with `output` [n, gains] and `duty` [n] of a gain schedule. Of several outputs the
+//! whole last layer as `output` [n, columns], and `action_NAME` [n] or `duty_NAME` [n] of each.
+
+mod several;
 
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
@@ -7,7 +10,7 @@ use toml_input::{Faults, FileName, Message, Sink};
 
 use super::told::Told;
 use super::{catalogue, header, tensors};
-use crate::model::{Feature, Golden, Head};
+use crate::model::{Feature, Golden, Head, Output, OutputAnswers};
 use crate::raw::Binary;
 
 /// What the contract allows a network that answers them.
@@ -30,6 +33,33 @@ pub(crate) struct Shape<'a> {
     pub outputs: usize,
     /// What the outputs become.
     pub head: &'a Head,
+    /// Each of several outputs; none where there is one.
+    pub several: &'a [OutputShape<'a>],
+}
+
+/// What golden answers say of one of several outputs.
+#[derive(Debug, Clone, Copy)]
+pub struct OutputShape<'a> {
+    /// Its name in the contract.
+    pub name: &'a str,
+    /// First column of the last layer.
+    pub column: usize,
+    /// How many columns.
+    pub width: usize,
+    /// Whether it chooses among actions.
+    pub is_choice: bool,
+}
+
+impl<'a> OutputShape<'a> {
+    /// Of an output of a contract.
+    pub(crate) fn of(output: &'a Output) -> Self {
+        Self {
+            name: &output.name,
+            column: output.column,
+            width: output.head.outputs(),
+            is_choice: output.head.is_choice(),
+        }
+    }
 }
 
 /// What the trainer made of the observations; a part that it did not give is empty.
@@ -38,6 +68,8 @@ struct Answers {
     q_values: Vec<f32>,
     action_indices: Vec<u32>,
     duties: Vec<f32>,
+    /// Of several outputs.
+    outputs: Vec<OutputAnswers>,
 }
 
 /// Reads and checks the vectors; `bounds` are checked only if every feature is known.
@@ -73,26 +105,12 @@ pub(crate) fn read(
         faults.push(file.name.tensor_fault("obs", message));
         return None;
     };
-    let is_choice = shape.head.is_choice();
-    let (first, second) = if is_choice { ("q", "action") } else { ("output", "duty") };
-    let (first, second) = ((first, view(first)), (second, view(second)));
-    if first.1.is_none() && second.1.is_none() {
-        let missing = if is_choice {
-            let expected = format!("`q` f32 [{rows}, {outputs}] or `action` i32 [{rows}], or both");
-            catalogue::golden_missing("q", &expected)
-        } else {
-            catalogue::golden_continuous(rows, outputs)
-        };
-        faults.push(file.name.fault(missing.found(names(&opened))));
-        return None;
-    }
     let obs = part(file, "obs", faults, floats(&observations, &[rows, features]));
-    let has_duty = !is_choice && second.1.is_some() && !bounds.is_empty();
-    let answers = if is_choice {
-        choices(file, [rows, outputs], [first, second], faults)
-    } else {
-        numbers(file, [rows, outputs], [first, second], faults)
+    let answers = match shape.several {
+        [] => answers_of_one(file, &opened, shape, rows, faults),
+        several => several::read(file, &opened, [rows, outputs], several, faults),
     };
+    let has_duty = matches!(shape.head, Head::Schedule(_)) && view("duty").is_some() && !bounds.is_empty();
     let told = match (shape.head, has_duty) {
         (Head::Schedule(head), true) => part(file, "duty", faults, Told::of(head, bounds)),
         _ => Some(Told::default()),
@@ -111,6 +129,7 @@ pub(crate) fn read(
         q_values: seen.keep(&answers.q_values, outputs),
         action_indices: seen.keep(&answers.action_indices, 1),
         duties: seen.keep(&answers.duties, 1),
+        outputs: answers.outputs.iter().map(|own| seen.keep_output(own)).collect(),
         tolerance: limits.tolerance,
         decisions: limits.decisions,
         duty_error: limits.duty_error,
@@ -118,20 +137,27 @@ pub(crate) fn read(
     (faults.count() == before).then_some(golden)
 }
 
-/// Whether golden answers could be those of a network that chooses, with so many inputs and actions. What a contract says of them, their ranges and the limits of a difference, is not judged.
+/// Whether golden answers could be those of a network that chooses, with so many inputs and actions; `several` are the outputs where
+/// there is more than one. What a contract says of them, their ranges and the limits of a difference, is not judged.
 ///
 /// # Errors
 /// The faults that a contract which names the file would meet.
-pub fn golden_fits(name: &FileName, bytes: Vec<u8>, inputs: usize, outputs: usize) -> Result<(), Faults> {
+pub fn golden_fits(
+    name: &FileName,
+    bytes: Vec<u8>,
+    inputs: usize,
+    outputs: usize,
+    several: &[OutputShape<'_>],
+) -> Result<(), Faults> {
     let file = Binary {
         name: name.clone(),
         bytes,
     };
-    let head = Head::Choice(Vec::new());
     let shape = Shape {
         features: inputs,
         outputs,
-        head: &head,
+        head: &Head::Choice(Vec::new()),
+        several,
     };
     let limits = Limits {
         tolerance: f64::INFINITY,
@@ -148,6 +174,39 @@ pub fn golden_fits(name: &FileName, bytes: Vec<u8>, inputs: usize, outputs: usiz
         faults.push(name.fault(message));
     }
     faults.propagate()
+}
+
+/// Answers of the one output: Q values and actions of a choice, else outputs and duties.
+fn answers_of_one(
+    file: &Binary,
+    opened: &SafeTensors<'_>,
+    shape: Shape<'_>,
+    rows: usize,
+    faults: &mut Sink,
+) -> Option<Answers> {
+    let outputs = shape.outputs;
+    let view = |name: &'static str| {
+        (
+            name,
+            opened.iter().find(|(found, _)| *found == name).map(|(_, view)| view),
+        )
+    };
+    let is_choice = shape.head.is_choice();
+    let parts = if is_choice { ["q", "action"] } else { ["output", "duty"] }.map(view);
+    if parts.iter().any(|(_, view)| view.is_some()) {
+        return match is_choice {
+            true => choices(file, [rows, outputs], parts, faults),
+            false => numbers(file, [rows, outputs], parts, faults),
+        };
+    }
+    let missing = if is_choice {
+        let expected = format!("`q` f32 [{rows}, {outputs}] or `action` i32 [{rows}], or both");
+        catalogue::golden_missing("q", &expected)
+    } else {
+        catalogue::golden_continuous(rows, outputs)
+    };
+    faults.push(file.name.fault(missing.found(names(opened))));
+    None
 }
 
 /// A tensor that may be there, by its name.
@@ -168,7 +227,7 @@ fn choices(file: &Binary, [rows, actions]: [usize; 2], parts: [Named<'_>; 2], fa
     Some(Answers {
         q_values: q_values?,
         action_indices: action_indices?,
-        duties: Vec::new(),
+        ..Answers::default()
     })
 }
 
@@ -183,8 +242,8 @@ fn numbers(file: &Binary, [rows, outputs]: [usize; 2], parts: [Named<'_>; 2], fa
     });
     Some(Answers {
         q_values: q_values?,
-        action_indices: Vec::new(),
         duties: duties?,
+        ..Answers::default()
     })
 }
 
@@ -263,6 +322,13 @@ impl Seen {
                 Err(catalogue::golden_outside_rows(message.clone(), outside, rows))
             }
             _ => Ok(()),
+        }
+    }
+
+    fn keep_output(&self, own: &OutputAnswers) -> OutputAnswers {
+        OutputAnswers {
+            action_indices: self.keep(&own.action_indices, 1),
+            duties: self.keep(&own.duties, 1),
         }
     }
 

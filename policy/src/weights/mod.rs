@@ -18,7 +18,7 @@ use crate::model::Layer;
 use crate::raw::Binary;
 use chain::{Chain, Ends};
 use explain::Scene;
-pub use golden::golden_fits;
+pub use golden::{OutputShape, golden_fits};
 use layers::{Dense, Layers};
 pub use tensors::NamedTensor;
 use tensors::Tensors;

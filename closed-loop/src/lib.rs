@@ -33,7 +33,9 @@ pub mod transfer;
 mod unusable;
 
 pub use agent::Agent;
-pub use controller::{Answer, Call, Classical, Controller, External, Period, Trajectory, follow, interpreter};
+pub use controller::{
+    Answer, Call, Classical, Controller, External, Period, Trajectory, follow, interpreter, interpreter_driving,
+};
 pub use converter::Converter;
 pub use course::{Course, Named, Tell};
 pub use environment::{Environment, LoadPath, Start};

@@ -8,6 +8,7 @@ use toml_input::{Fault, Message};
 
 use crate::faults::Error;
 use crate::load_step::LoadStep;
+use crate::scenario_file::Scenario;
 
 /// The voltage that the policy says it holds, V: its parameter `v_ref`.
 #[must_use]
@@ -23,6 +24,28 @@ pub fn v_ref(given: Option<f64>, policy: &Policy, file: &Path) -> Result<f64, Er
     given.or(held_by(policy)).ok_or_else(|| {
         let message = Message::new("no voltage to hold");
         let message = message.hint("v_ref = 100.0, as the policy has no parameter `v_ref`");
+        Fault::in_file(file, message).into()
+    })
+}
+
+/// The output of `policy` that drives the plant, by its index; `file` is the scenario's.
+///
+/// # Errors
+/// If the policy has several and the scenario names none of them.
+pub fn driving(scenario: &Scenario, policy: &Policy, file: &Path) -> Result<usize, Error> {
+    let output = policy.chosen_output(scenario.output.as_deref());
+    output.map_err(|message| {
+        let message = match policy.output_names().first().filter(|_| scenario.output.is_none()) {
+            Some(name) => message.hint(format!(
+                "output = \"{name}\" says which of them drives the plant, or --output {name}"
+            )),
+            None => message.maybe_hint(
+                policy
+                    .output_names()
+                    .is_empty()
+                    .then(|| "leave `output` and --output out".to_owned()),
+            ),
+        };
         Fault::in_file(file, message).into()
     })
 }

@@ -118,6 +118,7 @@ pub fn control(request: &Request, extended: &Parameters) -> Result<Control, Erro
     // only to fit: the runs below have ripple and noise
     let (nominal, real) = (quiet(&request.trained_on), quiet(extended));
     let refit = Refit {
+        output: 0,
         policy: &request.policy,
         nominal: &nominal,
         trained_on: request.losses,

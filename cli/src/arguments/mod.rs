@@ -287,6 +287,9 @@ pub struct Simulate {
     /// Plant file in the place of the scenario's
     #[arg(long, value_name = "PLANT")]
     pub plant: Option<PathBuf>,
+    /// Which of several outputs of the policy drives the plant, in the place of the scenario's `output`
+    #[arg(long, value_name = "NAME")]
+    pub output: Option<String>,
     /// Design the classical controllers on this plant file, not on the plant they run on
     #[arg(long, value_name = "PLANT")]
     pub designed_on: Option<PathBuf>,

@@ -249,7 +249,7 @@ fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Option
     if options.retrain.is_some() && (policy.mapping.is_none() || !is_buck) {
         return Ok(None);
     }
-    super::drm::needs_mapping(&policy)?;
+    super::drm::needs_mapping(&policy, 0)?;
     let (trained_on, file) = match &options.trained_on {
         Some(path) => (Parameters::buck_from_file(path, "`diagnose --policy`")?, path),
         None => (model.clone(), &options.model),

@@ -170,3 +170,129 @@ fn a_transfer_fits_the_mapping_of_the_output_that_it_is_told() {
         &["no mapping", "right"],
     );
 }
+
+/// A log of the loop under `left`: samples, its choices, and what `right` always wants, 0.5 * (-0.5) + 0.5.
+fn log(desk: &Desk, head: &str, more: impl Fn(usize, &[usize]) -> String) -> String {
+    if !desk.path("loop").exists() {
+        desk.succeed("simulate s.toml --policy two --output left --out loop");
+    }
+    let rows = cells(&desk.read("loop/200-500W-policy.csv"));
+    let actions: Vec<usize> = rows[1..].iter().map(|row| row[9].parse().unwrap()).collect();
+    let mut text = format!("v_out,i_l,i_out,{head}\n");
+    for (row, cells) in rows[1..].iter().enumerate() {
+        text += &format!("{},{},{},{}\n", cells[2], cells[3], cells[4], more(row, &actions));
+    }
+    text
+}
+
+#[test]
+fn a_log_is_held_against_each_output_by_its_own_columns() {
+    let desk = desk();
+    let both = "action_left,duty_right";
+    desk.write("log.csv", &log(&desk, both, |row, left| format!("{},0.25", left[row])));
+    let said = desk.succeed("replay two log.csv");
+    for part in [
+        "left: action equal in 80 of 80",
+        "right: duty equal in 80 of 80",
+        "the actions of left and the duties of right",
+    ] {
+        assert!(said.contains(part), "{part}\n{said}");
+    }
+    // names of others through the map
+    desk.edit("log.csv", both, "choice,command");
+    desk.succeed("replay two log.csv --map action_left=choice,duty_right=command");
+    // only the output that differs is named
+    let wrong = |text: &str, parts: &[&str], left_out: &str| {
+        desk.write("log.csv", text);
+        let ran = desk.type_in("replay two log.csv");
+        assert_eq!(ran.code, Some(1), "{}{}", ran.stdout, ran.stderr);
+        for part in parts {
+            assert!(ran.stdout.contains(part), "{part}\n{}", ran.stdout);
+        }
+        assert!(!ran.stdout.contains(left_out), "{left_out}\n{}", ran.stdout);
+    };
+    wrong(
+        &log(&desk, both, |row, left| format!("{},0.3", left[row])),
+        &[
+            "DIFFERENT: the duties of right.",
+            "right: duty equal in 0 of 80",
+            "left: action equal in 80 of 80",
+        ],
+        "the actions of left",
+    );
+    wrong(
+        &log(&desk, both, |row, left| {
+            format!("{},0.25", if row == 40 { 11 - left[row] } else { left[row] })
+        }),
+        &[
+            "DIFFERENT: the actions of left.",
+            "left: action equal in 79 of 80, first other in line 42",
+        ],
+        "the duties of right",
+    );
+    // a table of duties that is another one
+    wrong(
+        &log(&desk, "action_left,duty_left", |row, left| {
+            format!("{},{:.2}", left[row], 0.55 - 0.01 * left[row] as f64)
+        }),
+        &[
+            "left: the duties of the actions, by duty_left, are others",
+            "the actions of left of the log have other duties",
+        ],
+        "right:",
+    );
+    desk.write("log.csv", "v_out,i_l,i_out\n100,2,2\n");
+    desk.refuse(
+        "replay two log.csv",
+        &["nothing to compare with", "`action_left`, `action_right`"],
+    );
+    let refused = log(&desk, "action_right", |row, left| left[row].to_string());
+    desk.write("log.csv", &refused);
+    desk.refuse("replay two log.csv", &["commands a number", "`duty`"]);
+}
+
+#[test]
+fn the_duty_before_of_an_output_is_that_of_its_own_column() {
+    let desk = desk();
+    desk.edit(
+        "two/policy.toml",
+        "source = \"(i_l - i_out) / c_out\"\nscale = 3e-4",
+        "source = \"left_previous_duty - right_previous_duty\"\nscale = 10",
+    );
+    let with = |right: f64| {
+        log(&desk, "action_left,duty_right,obs_dv_dt", |row, left| {
+            let duty = |row: usize| 0.44 + 0.01 * left[row] as f64 - if row % 2 == 0 { 0.25 } else { right };
+            // both begin with 0.5
+            let before = if row == 0 { 0.0 } else { duty(row - 1) };
+            format!(
+                "{},{},{:.6}",
+                left[row],
+                if row % 2 == 0 { 0.25 } else { right },
+                10.0 * before
+            )
+        })
+    };
+    desk.write("log.csv", &with(0.3));
+    let ran = desk.type_in("replay two log.csv --exploring");
+    assert_eq!(ran.code, Some(0), "{}{}", ran.stdout, ran.stderr);
+    assert!(ran.stdout.contains("equal: the 1 of 6 features"), "{}", ran.stdout);
+    // the feature follows right's column: with another value there it is another
+    let log = with(0.3).replace(",0.3,", ",0.31,");
+    desk.write("log.csv", &log);
+    assert_eq!(desk.type_in("replay two log.csv --exploring").code, Some(1));
+}
+
+#[test]
+fn what_knows_one_duty_says_what_to_do() {
+    let desk = desk();
+    let rest = "several outputs, and one duty is taken here";
+    desk.refuse(
+        "certify two --out c",
+        &[rest, "outputs left, right", "policyc new MODEL --output N"],
+    );
+    let training = "plant = \"plants/paper-model.toml\"\ncontract = \"two/policy.toml\"\n";
+    desk.write("t.toml", training);
+    let ran = desk.type_in("train t.toml --out trained");
+    assert_eq!(ran.code, Some(2), "{}{}", ran.stdout, ran.stderr);
+    assert!(!desk.path("trained/policy.toml").exists());
+}

@@ -8,7 +8,6 @@ use toml_input::{Fault, Message};
 
 use crate::faults::Error;
 use crate::load_step::LoadStep;
-use crate::scenario_file::Scenario;
 
 /// The voltage that the policy says it holds, V: its parameter `v_ref`.
 #[must_use]
@@ -28,14 +27,14 @@ pub fn v_ref(given: Option<f64>, policy: &Policy, file: &Path) -> Result<f64, Er
     })
 }
 
-/// The output of `policy` that drives the plant, by its index; `file` is the scenario's.
+/// The output of `policy` that drives the plant, by its index, of the name that `file`, a scenario, or the command line says.
 ///
 /// # Errors
-/// If the policy has several and the scenario names none of them.
-pub fn driving(scenario: &Scenario, policy: &Policy, file: &Path) -> Result<usize, Error> {
-    let output = policy.chosen_output(scenario.output.as_deref());
+/// If the policy has several and none of them is named.
+pub fn driving(wanted: Option<&str>, policy: &Policy, file: &Path) -> Result<usize, Error> {
+    let output = policy.chosen_output(wanted);
     output.map_err(|message| {
-        let message = match policy.output_names().first().filter(|_| scenario.output.is_none()) {
+        let message = match policy.output_names().first().filter(|_| wanted.is_none()) {
             Some(name) => message.hint(format!(
                 "output = \"{name}\" says which of them drives the plant, or --output {name}"
             )),

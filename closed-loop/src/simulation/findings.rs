@@ -125,7 +125,7 @@ impl Setting {
             return Err(Fault::in_file(file, message).into());
         };
         let plant = name.shown.clone();
-        let output = driving(&scenario, &policy, file)?;
+        let output = driving(scenario.output.as_deref(), &policy, file)?;
         let converter = load(name, &scenario.set)?;
         let references: Vec<f64> = (scenario.load_steps.iter().filter_map(|step| step.reference))
             .flatten()

@@ -99,7 +99,7 @@ impl Setting {
     /// If the policy has no mapping, no plant or no voltage to hold is named, the plant's file is none, or policy and plant do
     /// not suit each other.
     pub fn new(file: &Path, scenario: Scenario, policy: Policy) -> Result<Self, Error> {
-        let output = driving(&scenario, &policy, file)?;
+        let output = driving(scenario.output.as_deref(), &policy, file)?;
         needs_mapping(&policy, output)?;
         let Some(trained_on) = &scenario.plant else {
             let message = Message::new("no plant").expected("the converter that the policy was trained on");

@@ -290,9 +290,21 @@ fn what_knows_one_duty_says_what_to_do() {
         "certify two --out c",
         &[rest, "outputs left, right", "policyc new MODEL --output N"],
     );
-    let training = "plant = \"plants/paper-model.toml\"\ncontract = \"two/policy.toml\"\n";
-    desk.write("t.toml", training);
-    let ran = desk.type_in("train t.toml --out trained");
-    assert_eq!(ran.code, Some(2), "{}{}", ran.stdout, ran.stderr);
-    assert!(!desk.path("trained/policy.toml").exists());
+    let example = tests::root().join("examples/train/paper12.toml");
+    let lines = std::fs::read_to_string(example).unwrap();
+    let here = |line: &str| match line.split(' ').next() {
+        Some("plant") => "plant = \"plants/paper-model.toml\"".to_owned(),
+        Some("contract") => "contract = \"two/policy.toml\"".to_owned(),
+        _ => line.to_owned(),
+    };
+    let lines: Vec<String> = lines.lines().map(here).collect();
+    desk.write("t.toml", &lines.join("\n"));
+    let words = [
+        "two/policy.toml",
+        "outputs left, right",
+        "a contract without [[output]]",
+        "policyc new model.zip",
+    ];
+    desk.refuse("train t.toml --out trained", &words);
+    assert!(!desk.path("trained").exists());
 }

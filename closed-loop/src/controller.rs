@@ -152,6 +152,7 @@ impl External<()> {
     ///
     /// # Errors
     /// If the contract measures something that the plant does not have.
+    #[expect(clippy::type_complexity, reason = "a type alias cannot name the closure")]
     pub fn new<F: FnMut(Call<'_>) -> Result<Option<Answer>, Error>>(
         policy: &Policy,
         mut ask: F,

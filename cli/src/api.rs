@@ -31,12 +31,12 @@ pub fn command() -> clap::Command {
     Arguments::command()
 }
 
-/// The policy at `path`, which is a contract or its folder, in another numeric format if one is asked for.
+/// The policy at `path`, with one output or several, which is a contract or its folder, in another numeric format if one is asked for.
 ///
 /// # Errors
 /// All faults of its files.
 pub fn load(path: &Path, allow_outside: bool, format: Option<NumericFormat>) -> Result<Policy, Failure> {
-    commands::load_as(path, Outside { allow_outside }, format)
+    commands::load_several_as(path, Outside { allow_outside }, format)
 }
 
 /// What `policyc simulate`, `policyc diagnose` or `policyc drm fit` would write for the command line `arguments`, the command's

@@ -6,6 +6,7 @@ use plant::Signals;
 use policy::{Policy, Scalar};
 use toml_input::Message;
 
+use crate::controller::Answer;
 use crate::faults::Error;
 
 /// The names that a contract's signals may have: what is measured, and the voltage to hold, which the firmware sets.
@@ -20,6 +21,10 @@ pub struct Agent<T> {
     controller: Controller<T>,
     trace: Trace<T>,
     inputs: Inputs,
+    /// Index of the output whose duty is the plant's.
+    output: usize,
+    /// What the others answered last.
+    others: Vec<Answer>,
 }
 
 /// A plant's measurements in the words of a contract.
@@ -116,11 +121,21 @@ impl<T: Real> Agent<T> {
     /// # Errors
     /// If the contract measures something that the plant does not have.
     pub fn told(policy: &Policy) -> Result<Self, Error> {
+        Self::driving(policy, 0)
+    }
+
+    /// [`Agent::told`] of a contract with several outputs, of which the one of that index drives the plant.
+    ///
+    /// # Errors
+    /// As [`Agent::told`].
+    pub fn driving(policy: &Policy, output: usize) -> Result<Self, Error> {
         let controller = Controller::new(policy);
         Ok(Self {
             trace: controller.blank_trace(),
             inputs: Inputs::new(policy)?,
             controller,
+            output,
+            others: Vec::new(),
         })
     }
 
@@ -181,13 +196,26 @@ impl<T: Real> Agent<T> {
     pub fn step(&mut self, measured: &Signals) -> Result<f64, Error> {
         let samples = self.inputs.samples(measured);
         self.controller.step_into(samples, &mut self.trace)?;
-        Ok(self.trace.command.duty.to_f64())
+        self.others.clear();
+        let others = self
+            .trace
+            .commands()
+            .enumerate()
+            .filter(|(index, _)| *index != self.output);
+        self.others.extend(others.map(|(_, command)| Answer::of(&command)));
+        Ok(self.command().duty.to_f64())
     }
 
-    /// The command of the last step.
+    /// The command of the last step, of several outputs that of the one that drives the plant.
     #[must_use]
-    pub fn command(&self) -> &Command<T> {
-        &self.trace.command
+    pub fn command(&self) -> Command<T> {
+        self.trace.commands().nth(self.output).unwrap_or(self.trace.command)
+    }
+
+    /// What the other outputs answered in the last [`Agent::step`], in the order of the contract.
+    #[must_use]
+    pub fn others(&self) -> &[Answer] {
+        &self.others
     }
 
     /// Duty of the step before, 0..1.

@@ -1,6 +1,6 @@
 //! What can stand at the controller's place, and its run over a load step.
 
-use interp::{Real, Sample as Word};
+use interp::{Command, Real, Sample as Word};
 use plant::{Sample, Signals};
 use policy::{Policy, Scalar};
 use toml_input::Message;
@@ -23,6 +23,17 @@ pub struct Answer {
     pub status: u32,
 }
 
+impl Answer {
+    /// What a controller of a contract commands.
+    pub(crate) fn of<T: Real>(command: &Command<T>) -> Self {
+        Self {
+            duty: command.duty.to_f64(),
+            action: Some(command.action_index),
+            status: command.status,
+        }
+    }
+}
+
 /// A controller that can be switched on again and again.
 pub trait Controller {
     /// As switched on.
@@ -39,6 +50,12 @@ pub trait Controller {
     /// # Errors
     /// If it does not answer.
     fn step(&mut self, measured: &Signals) -> Result<Answer, Error>;
+
+    /// What the outputs that do not drive the plant answered in the last step, in the order of the contract; empty of a
+    /// controller with one duty.
+    fn others(&self) -> &[Answer] {
+        &[]
+    }
 }
 
 impl<T: Real> Controller for Agent<T> {
@@ -52,13 +69,12 @@ impl<T: Real> Controller for Agent<T> {
     }
 
     fn step(&mut self, measured: &Signals) -> Result<Answer, Error> {
-        let duty = Agent::step(self, measured)?;
-        let command = self.command();
-        Ok(Answer {
-            duty,
-            action: Some(command.action_index),
-            status: command.status,
-        })
+        Agent::step(self, measured)?;
+        Ok(Answer::of(&self.command()))
+    }
+
+    fn others(&self) -> &[Answer] {
+        Agent::others(self)
     }
 }
 
@@ -67,9 +83,17 @@ impl<T: Real> Controller for Agent<T> {
 /// # Errors
 /// If the contract measures something that the plant does not have.
 pub fn interpreter(policy: &Policy) -> Result<Box<dyn Controller>, Error> {
+    interpreter_driving(policy, 0)
+}
+
+/// [`interpreter`] of a contract with several outputs, of which the one of that index drives the plant.
+///
+/// # Errors
+/// As [`interpreter`].
+pub fn interpreter_driving(policy: &Policy, output: usize) -> Result<Box<dyn Controller>, Error> {
     Ok(match policy.numeric_format.scalar() {
-        Scalar::F32 => Box::new(Agent::<f32>::told(policy)?),
-        Scalar::F64 => Box::new(Agent::<f64>::told(policy)?),
+        Scalar::F32 => Box::new(Agent::<f32>::driving(policy, output)?),
+        Scalar::F64 => Box::new(Agent::<f64>::driving(policy, output)?),
     })
 }
 
@@ -117,22 +141,45 @@ pub enum Call<'a> {
 pub struct External<F> {
     inputs: Inputs,
     ask: F,
+    /// Index of the output whose duty is the plant's.
+    output: usize,
+    /// What the others answered last.
+    others: Vec<Answer>,
 }
 
-impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, Error>> External<F> {
+impl External<()> {
     /// `ask` passes on calls.
     ///
     /// # Errors
     /// If the contract measures something that the plant does not have.
-    pub fn new(policy: &Policy, ask: F) -> Result<Self, Error> {
-        Ok(Self {
+    #[expect(clippy::type_complexity, reason = "a type alias cannot name the closure")]
+    pub fn new<F: FnMut(Call<'_>) -> Result<Option<Answer>, Error>>(
+        policy: &Policy,
+        mut ask: F,
+    ) -> Result<External<impl FnMut(Call<'_>) -> Result<Vec<Answer>, Error>>, Error> {
+        Self::driving(policy, 0, move |call: Call<'_>| Ok(ask(call)?.into_iter().collect()))
+    }
+
+    /// [`External::new`] of a contract with several outputs, of which the one of the index `output` drives the plant; `ask` gives
+    /// an answer for each, in the order of the contract.
+    ///
+    /// # Errors
+    /// As [`External::new`].
+    pub fn driving<F: FnMut(Call<'_>) -> Result<Vec<Answer>, Error>>(
+        policy: &Policy,
+        output: usize,
+        ask: F,
+    ) -> Result<External<F>, Error> {
+        Ok(External {
             inputs: Inputs::new(policy)?,
             ask,
+            output,
+            others: Vec::new(),
         })
     }
 }
 
-impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, Error>> Controller for External<F> {
+impl<F: FnMut(Call<'_>) -> Result<Vec<Answer>, Error>> Controller for External<F> {
     fn restart(&mut self) -> Result<(), Error> {
         (self.ask)(Call::Restart).map(|_| ())
     }
@@ -143,8 +190,17 @@ impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, Error>> Controller for Externa
 
     fn step(&mut self, measured: &Signals) -> Result<Answer, Error> {
         let samples = self.inputs.samples(measured);
-        let answer = (self.ask)(Call::Step(samples))?;
-        answer.ok_or_else(|| Message::new("a control step was not answered").into())
+        let mut answers = (self.ask)(Call::Step(samples))?;
+        if self.output >= answers.len() {
+            return Err(Message::new("a control step was not answered").into());
+        }
+        let own = answers.remove(self.output);
+        self.others = answers;
+        Ok(own)
+    }
+
+    fn others(&self) -> &[Answer] {
+        &self.others
     }
 }
 
@@ -166,6 +222,8 @@ pub struct Trajectory {
     pub metrics: Metrics,
     /// Every control period from the start.
     pub periods: Vec<Period>,
+    /// By control period, what [`Controller::others`] gave.
+    pub others: Vec<Vec<Answer>>,
 }
 
 impl Trajectory {
@@ -199,6 +257,13 @@ impl Trajectory {
         };
         let (a, b) = (&self.periods, &other.periods);
         let differs = a.iter().zip(b).position(|(a, b)| bits(a) != bits(b));
+        let beside = |answers: &Vec<Answer>| -> Vec<_> {
+            let bits = answers.iter().map(|answer| (answer.duty.to_bits(), answer.action));
+            bits.collect()
+        };
+        let others = self.others.iter().zip(&other.others);
+        let others = others.into_iter().position(|(a, b)| beside(a) != beside(b));
+        let differs = [differs, others].into_iter().flatten().min();
         differs.or((a.len() != b.len()).then_some(a.len().min(b.len())))
     }
 }
@@ -219,7 +284,7 @@ pub fn follow<E: Environment>(
     let [before, after] = step.held(v_ref);
     controller.set_reference(before);
     let lead = task.lead + instant.periods;
-    let (mut answers, mut failure) = (Vec::new(), None);
+    let (mut answers, mut others, mut failure) = (Vec::new(), Vec::new(), None);
     let ask = |sample: &Sample| {
         let blank = Answer {
             duty: f64::NAN,
@@ -240,6 +305,7 @@ pub fn follow<E: Environment>(
             })
         };
         answers.push(answer);
+        others.push(controller.others().to_vec());
         answer.duty
     };
     let (metrics, records) = load_step(environment.clone(), ask, v_ref, task, step, instant)?;
@@ -251,5 +317,6 @@ pub fn follow<E: Environment>(
         instant,
         metrics,
         periods: periods.map(|(record, answer)| Period { record, answer }).collect(),
+        others,
     })
 }

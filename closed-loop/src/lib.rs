@@ -33,17 +33,19 @@ pub mod transfer;
 mod unusable;
 
 pub use agent::Agent;
-pub use controller::{Answer, Call, Classical, Controller, External, Period, Trajectory, follow, interpreter};
+pub use controller::{
+    Answer, Call, Classical, Controller, External, Period, Trajectory, follow, interpreter, interpreter_driving,
+};
 pub use converter::Converter;
 pub use course::{Course, Named, Tell};
 pub use environment::{Environment, LoadPath, Start};
 pub use faults::Error;
 pub use load_step::{LoadKind, LoadStep};
-pub use map::{DecisionMap, MapAxis, decision_map};
+pub use map::{DecisionMap, MapAxis, decision_map, decision_map_of};
 pub use rest::{RestMap, rest_map};
 pub use scenario_file::Scenario;
 pub use simulation::band_text;
-pub use suits::{held_by, holds_power, reaches, suits, v_ref};
+pub use suits::{driving, held_by, holds_power, reaches, suits, v_ref};
 pub use tables::{
     AT_REST, COLUMNS, MetricsCsv, at_rest, cells, comparison, digits, evaluation_csv, limit_cells, limits, rest_cells,
     table, time_digits, trajectory_csv,

@@ -23,16 +23,30 @@ pub type MapAxis = (usize, Vec<f64>);
 /// # Errors
 /// If a measurement does not fit the contract.
 pub fn decision_map(policy: &Policy, x: &MapAxis, y: &MapAxis, at: &[f64]) -> Result<DecisionMap, Error> {
+    decision_map_of(policy, 0, x, y, at)
+}
+
+/// [`decision_map`] of the output of that index.
+///
+/// # Errors
+/// As [`decision_map`].
+pub fn decision_map_of(
+    policy: &Policy,
+    output: usize,
+    x: &MapAxis,
+    y: &MapAxis,
+    at: &[f64],
+) -> Result<DecisionMap, Error> {
     match policy.numeric_format.scalar() {
-        Scalar::F32 => cells::<f32>(policy, x, y, at),
-        Scalar::F64 => cells::<f64>(policy, x, y, at),
+        Scalar::F32 => cells::<f32>(policy, output, [x, y], at),
+        Scalar::F64 => cells::<f64>(policy, output, [x, y], at),
     }
 }
 
-fn cells<T: Real>(policy: &Policy, x: &MapAxis, y: &MapAxis, at: &[f64]) -> Result<DecisionMap, Error> {
+fn cells<T: Real>(policy: &Policy, output: usize, [x, y]: [&MapAxis; 2], at: &[f64]) -> Result<DecisionMap, Error> {
     let controller = Controller::<T>::new(policy);
     let mut trace = controller.blank_trace();
-    let chooses = policy.head.is_choice();
+    let chooses = policy.path(output).head.is_choice();
     let mut map = DecisionMap {
         duties: Vec::with_capacity(x.1.len() * y.1.len()),
         actions: Vec::new(),
@@ -49,9 +63,10 @@ fn cells<T: Real>(policy: &Policy, x: &MapAxis, y: &MapAxis, at: &[f64]) -> Resu
                 .map(|(signal, value)| sample(policy, signal, value))
                 .collect();
             controller.eval_into(&samples, &mut trace)?;
-            map.duties.push(trace.duty_sim.to_f64());
+            let decision = trace.decision(output);
+            map.duties.push(decision.duty_sim.to_f64());
             if chooses {
-                map.actions.push(trace.action_index);
+                map.actions.push(decision.action_index);
             }
         }
     }

@@ -57,6 +57,8 @@ impl<E: Environment> Bench for AtEnvironment<E> {
 pub struct Refit<'a> {
     /// The policy.
     pub policy: &'a Policy,
+    /// Index of the output whose mapping it is; 0 of a policy with one.
+    pub output: usize,
     /// What it was trained on.
     pub nominal: &'a Parameters,
     /// The steady state of that.
@@ -94,7 +96,7 @@ impl Refit<'_> {
     /// If a load or voltage makes no sense.
     pub fn plan(&self, v_in: f64) -> Result<Plan, Error> {
         let own = self.nominal.converter.v_in;
-        let (low, high) = duties(self.policy);
+        let (low, high) = self.duties();
         let low = (low * own).max((1.0 - BESIDE) * self.v_ref);
         // 3 % for what a real converter loses at full duty
         let high = (high * own).min((1.0 + BESIDE) * self.v_ref).min(0.97 * v_in.min(own));
@@ -154,10 +156,9 @@ impl Refit<'_> {
     pub fn with(&self, map: &DutyRatioMap) -> Result<Policy, Error> {
         // through its text, so that digits and checks are those of a file
         let mut mapping = policy::read_mapping(Path::new("drm.toml"), &map.to_toml(""))?;
-        let mut policy = self.policy.clone();
-        mapping.load_current = policy.mapping.map_or(0, |mapping| mapping.load_current);
-        policy.mapping = Some(mapping);
-        Ok(policy)
+        let own = self.policy.path(self.output).mapping;
+        mapping.load_current = own.map_or(0, |mapping| mapping.load_current);
+        Ok(self.policy.clone().with_mapping(self.output, mapping))
     }
 
     /// What no mapping repairs at `real`, in words.
@@ -165,7 +166,7 @@ impl Refit<'_> {
     /// # Errors
     /// If either converter is none.
     pub fn beyond_repair(&self, real: &Parameters, map: &DutyRatioMap) -> Result<Vec<String>, Error> {
-        let limits = Some(self.policy.limits.duty);
+        let limits = Some(self.policy.path(self.output).limits.duty);
         // equal currents, for constant power may not come to rest
         let at_rest = |load: LoadSetting| LoadSetting::Current(load.current(self.v_ref));
         let loads: Vec<LoadSetting> = self.loads().into_iter().map(at_rest).collect();
@@ -177,13 +178,13 @@ impl Refit<'_> {
 
     /// Whether the policy's duty limits cut off what the mapping makes of its actions.
     fn cut_off(&self, map: &DutyRatioMap) -> Option<String> {
-        let (low, high) = duties(self.policy);
+        let (low, high) = self.duties();
         let mapped = DutyRatioMap {
             valid_d_sim: Interval { low, high },
             ..*map
         }
         .duty_range();
-        let limits = self.policy.limits.duty;
+        let limits = self.policy.path(self.output).limits.duty;
         let (too_low, too_high) = (mapped.low < limits.low, mapped.high > limits.high);
         // 0 and 1 are the ends of any modulator
         (too_low && limits.low > 0.0 || too_high && limits.high < 1.0).then(|| {
@@ -194,24 +195,29 @@ impl Refit<'_> {
             )
         })
     }
+
+    /// Smallest and largest duty before the mapping.
+    fn duties(&self) -> (f64, f64) {
+        let all = self.policy.path(self.output).head.duties().into_iter();
+        all.fold((1.0, 0.0), |(low, high), duty| (duty.min(low), duty.max(high)))
+    }
 }
 
-/// Refuses a policy whose duties no mapping can follow.
+/// Refuses a policy with an output, by its index, whose duty no mapping can follow.
 ///
 /// # Errors
-/// If its contract has no mapping.
-pub fn needs_mapping(policy: &Policy) -> Result<(), Error> {
-    if policy.mapping.is_none() {
+/// If its contract has no mapping for it.
+pub fn needs_mapping(policy: &Policy, output: usize) -> Result<(), Error> {
+    let path = policy.path(output);
+    if path.mapping.is_none() {
+        if let Some(name) = path.name {
+            let message = Message::new("this output of the policy has no mapping to transfer with").found(name);
+            return Err(message.hint("add `mapping = { file = \"drm.toml\", load_current = \"i_out\" }` to it, and an identity a = 1, b = 0, c = 0").into());
+        }
         let hint = "add [mapping] with file = \"drm.toml\" and load_current, and an identity a = 1, b = 0, c = 0";
         return Err(Message::new("the policy has no mapping to transfer with")
             .hint(hint)
             .into());
     }
     Ok(())
-}
-
-/// Smallest and largest duty before the mapping.
-fn duties(policy: &Policy) -> (f64, f64) {
-    let all = policy.head.duties().into_iter();
-    all.fold((1.0, 0.0), |(low, high), duty| (duty.min(low), duty.max(high)))
 }

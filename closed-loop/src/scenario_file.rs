@@ -17,6 +17,8 @@ pub struct Scenario {
     pub plant: Option<FileName>,
     /// Numbers of the plant that take the place of its file's, by key.
     pub set: Vec<(String, f64)>,
+    /// Which of several outputs of the policy drives the plant, by name.
+    pub output: Option<String>,
     /// Voltage to hold, V; nothing if it is the policy's parameter `v_ref`.
     pub v_ref: Option<f64>,
     /// Load steps in the order of the file: powers, currents, resistances.
@@ -61,6 +63,7 @@ impl Scenario {
 fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<Scenario> {
     let plant = root.optional("plant").and_then(|v| v.text(faults));
     let set = root.with_default("set", Vec::new(), faults, read::plant_numbers);
+    let output = root.optional("output").and_then(|v| v.text(faults)).map(str::to_owned);
     let v_ref = root.optional("v_ref").and_then(|v| v.positive(faults));
     let (currents, resistances) = (root.optional("current_steps"), root.optional("resistance_steps"));
     let others = ["source_steps", "reference_steps"];
@@ -107,6 +110,7 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<S
     Some(Scenario {
         plant: plant.map(|text| document.source().name.beside(text)),
         set,
+        output,
         v_ref,
         load_steps,
         default_steps,

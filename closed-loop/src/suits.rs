@@ -27,6 +27,28 @@ pub fn v_ref(given: Option<f64>, policy: &Policy, file: &Path) -> Result<f64, Er
     })
 }
 
+/// The output of `policy` that drives the plant, by its index, of the name that `file`, a scenario, or the command line says.
+///
+/// # Errors
+/// If the policy has several and none of them is named.
+pub fn driving(wanted: Option<&str>, policy: &Policy, file: &Path) -> Result<usize, Error> {
+    let output = policy.chosen_output(wanted);
+    output.map_err(|message| {
+        let message = match policy.output_names().first().filter(|_| wanted.is_none()) {
+            Some(name) => message.hint(format!(
+                "output = \"{name}\" says which of them drives the plant, or --output {name}"
+            )),
+            None => message.maybe_hint(
+                policy
+                    .output_names()
+                    .is_empty()
+                    .then(|| "leave `output` and --output out".to_owned()),
+            ),
+        };
+        Fault::in_file(file, message).into()
+    })
+}
+
 /// Whether a load of constant power is one around `v_ref` V at this converter; `file` is where the converter was named.
 ///
 /// # Errors

@@ -171,7 +171,7 @@ fn pair(x: f64, y: f64, digits: usize) -> String {
     format!("{x:.digits$} / {y:.digits$}")
 }
 
-fn line(first: &str, columns: &[String]) -> String {
+pub(crate) fn line(first: &str, columns: &[String]) -> String {
     let padded = |out: String, column: &String| format!("{out} {column:<15}");
     let row = columns.iter().fold(format!("{first:<17}"), padded);
     format!("{}\n", row.trim_end())
@@ -247,21 +247,26 @@ pub(crate) fn figures(m: &Metrics) -> String {
 }
 
 /// A trajectory as CSV: one line per control period, what the controller saw at its start (true signals), the extremes of
-/// the voltage since the sample before, and what it commanded. SI units, time from the load step.
+/// the voltage since the sample before, and what it commanded. SI units, time from the load step. `beside` are the names of the
+/// outputs that do not drive the plant, whose duties and actions stand behind.
 #[must_use]
-pub fn trajectory_csv(trajectory: &Trajectory, kind: LoadKind) -> String {
+pub fn trajectory_csv(trajectory: &Trajectory, kind: LoadKind, beside: &[&str]) -> String {
+    let others: String = beside
+        .iter()
+        .map(|name| format!(",duty_{name},action_{name}"))
+        .collect();
     let mut out = format!(
-        "t_s,load_{},v_out_V,i_l_A,i_out_A,v_in_V,v_min_V,v_max_V,duty,action,status\n",
+        "t_s,load_{},v_out_V,i_l_A,i_out_A,v_in_V,v_min_V,v_max_V,duty,action,status{others}\n",
         kind.unit()
     );
-    for period in &trajectory.periods {
+    for (index, period) in trajectory.periods.iter().enumerate() {
         let (record, sample) = (&period.record, &period.record.sample);
         let action = period
             .answer
             .action
             .map(|action| action.to_string())
             .unwrap_or_default();
-        let _ = writeln!(
+        let _ = write!(
             out,
             // time to a nanosecond: as a product it would otherwise show the last bits of its factors
             "{:.9},{},{},{},{},{},{},{},{},{action},{}",
@@ -276,6 +281,10 @@ pub fn trajectory_csv(trajectory: &Trajectory, kind: LoadKind) -> String {
             record.duty,
             period.answer.status,
         );
+        for other in trajectory.others.get(index).into_iter().flatten().take(beside.len()) {
+            let _ = write!(out, ",{},{}", other.duty, other.action.unwrap_or_default());
+        }
+        out.push('\n');
     }
     out
 }

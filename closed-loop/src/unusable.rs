@@ -90,6 +90,7 @@ mod tests {
             instant: scenario::Instant { periods: 0, phase: 0.0 },
             metrics: scenario::Metrics::default(),
             periods,
+            others: Vec::new(),
         };
         assert_eq!(unusable(&trajectory(vec![period(1.0, 0)]), &policy), None);
         let range = policy.signals.iter().find(|signal| signal.name == "i_l").unwrap().range;

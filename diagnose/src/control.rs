@@ -76,6 +76,8 @@ pub struct Control {
 pub struct Request {
     /// The policy, with a mapping.
     pub policy: Policy,
+    /// Index of the output that drives the converter, and whose mapping is refitted; 0 of a policy with one.
+    pub output: usize,
     /// The converter it was trained on.
     pub trained_on: Parameters,
     /// Steady state of that.
@@ -119,6 +121,7 @@ pub fn control(request: &Request, extended: &Parameters) -> Result<Control, Erro
     let (nominal, real) = (quiet(&request.trained_on), quiet(extended));
     let refit = Refit {
         policy: &request.policy,
+        output: request.output,
         nominal: &nominal,
         trained_on: request.losses,
         v_ref: request.v_ref,
@@ -127,8 +130,8 @@ pub fn control(request: &Request, extended: &Parameters) -> Result<Control, Erro
     let report = refit.fit(&acquire(&refit, &real)?)?;
     let own = request
         .policy
+        .path(request.output)
         .mapping
-        .as_ref()
         .map_or(DutyRatioMap::IDENTITY, DutyRatioMap::from);
     let fitted = report.fit.map.rounded();
     let largest_change = furthest(&own, &fitted);
@@ -221,7 +224,7 @@ fn furthest(own: &DutyRatioMap, fitted: &DutyRatioMap) -> f64 {
 fn run(request: &Request, policy: &Policy, converter: &Parameters) -> Result<Vec<(Metrics, Vec<Period>)>, Error> {
     let environment = Converter::new(converter)?;
     // figures, not bits: binary32 will do for every format
-    let mut agent = Agent::<f32>::new(policy)?;
+    let mut agent = Agent::<f32>::driving(policy, request.output)?;
     let mut one = |step: &LoadStep| {
         let mut finding = Finding::new(*step);
         let mut shown = None;

@@ -17,6 +17,7 @@ fn controlled(change: impl Fn(&mut Parameters)) -> Control {
     let mut extended = trained_on.clone();
     change(&mut extended);
     let request = Request {
+        output: 0,
         policy: policy::load(&folder.join("policy/policy.toml")).unwrap(),
         losses: Losses::of(&trained_on).unwrap(),
         trained_on,

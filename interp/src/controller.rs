@@ -179,11 +179,18 @@ impl<T: Real> Controller<T> {
     /// beyond the last action counts as the last. A head without a choice has no actions to choose from: the initial duty is
     /// commanded.
     pub fn choose(&self, trace: &mut Trace<T>, action_index: u32) {
-        let chosen = self.head().choose(action_index);
-        (trace.action_index, trace.duty_sim) = match chosen {
-            Some((index, chosen)) => (index, self.head().duty(trace.base, chosen)),
-            None => (0, self.paths[0].initial_duty),
+        self.choose_of(trace, 0, action_index);
+    }
+
+    /// [`Controller::choose`] for the output of that index; what was decided for the others stays.
+    pub fn choose_of(&self, trace: &mut Trace<T>, output: usize, action_index: u32) {
+        let Some(path) = self.paths.get(output) else { return };
+        let mut decision = trace.decision(output);
+        (decision.action_index, decision.duty_sim) = match path.head.choose(action_index) {
+            Some((index, chosen)) => (index, path.head.duty(trace.base, chosen)),
+            None => (0, path.initial_duty),
         };
+        trace.set_decision(output, decision);
         self.act(trace);
     }
 

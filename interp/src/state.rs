@@ -101,7 +101,8 @@ impl<T: Real> State<T> {
         1 + self.others.len()
     }
 
-    pub(crate) fn set_output(&mut self, index: usize, to: Remembered<T>) {
+    /// Replaces what is remembered of the output of that index.
+    pub fn set_output(&mut self, index: usize, to: Remembered<T>) {
         match index.checked_sub(1) {
             None => {
                 (self.previous_duty, self.previous_command) = (to.previous_duty, to.previous_command);

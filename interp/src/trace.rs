@@ -127,7 +127,7 @@ pub struct Decision<T> {
 
 impl<T: Copy> Trace<T> {
     /// What was decided for the output of that index; for the first where there is no such one.
-    pub(crate) fn decision(&self, index: usize) -> Decision<T> {
+    pub fn decision(&self, index: usize) -> Decision<T> {
         let other = index.checked_sub(1).and_then(|index| self.others.get(index));
         other.copied().unwrap_or(Decision {
             action_index: self.action_index,
@@ -140,7 +140,8 @@ impl<T: Copy> Trace<T> {
         })
     }
 
-    pub(crate) fn set_decision(&mut self, index: usize, to: Decision<T>) {
+    /// Replaces what was decided for the output of that index.
+    pub fn set_decision(&mut self, index: usize, to: Decision<T>) {
         match index.checked_sub(1) {
             None => {
                 (self.action_index, self.duty_sim) = (to.action_index, to.duty_sim);

@@ -1,6 +1,7 @@
 //! Duties of a controller: one, or several that are decided from one network (contract section 9b).
 
 use serde::Serialize;
+use toml_input::Message;
 
 use crate::head::Head;
 use crate::model::{Input, Limits, Mapping, Policy};
@@ -105,5 +106,54 @@ impl Policy {
     #[must_use]
     pub fn output_names(&self) -> Vec<&str> {
         self.paths().into_iter().filter_map(|path| path.name).collect()
+    }
+
+    /// The same with another mapping of the output of that index.
+    #[must_use]
+    pub fn with_mapping(mut self, output: usize, mapping: Mapping) -> Self {
+        match &mut self.head {
+            Head::Several(outputs) => {
+                if let Some(own) = outputs.get_mut(output) {
+                    own.mapping = Some(mapping);
+                }
+            }
+            _ => self.mapping = Some(mapping),
+        }
+        self
+    }
+
+    /// The way of the output of that index; the first where there is no such one.
+    #[must_use]
+    pub fn path(&self, output: usize) -> DutyPath<'_> {
+        let mut paths = self.paths();
+        let index = if output < paths.len() { output } else { 0 };
+        paths.swap_remove(index)
+    }
+
+    /// Index of the output of that name, for whoever works with one duty; 0 of a contract with one output, which has no name.
+    ///
+    /// # Errors
+    /// A contract with several and no name, one with another name, or one output and a name.
+    pub fn chosen_output(&self, wanted: Option<&str>) -> Result<usize, Message> {
+        let names = self.output_names();
+        let list = names.join(", ");
+        match (wanted, names.as_slice()) {
+            (None, []) => Ok(0),
+            (Some(wanted), []) => {
+                let message = Message::new("an output by name, and a contract with one, which has none");
+                Err(message.found(wanted).expected("no name"))
+            }
+            (None, _) => {
+                let message = Message::new("this contract has several outputs, and one duty is taken here");
+                Err(message
+                    .found(format!("outputs {list}"))
+                    .expected("the name of one of them"))
+            }
+            (Some(wanted), names) => names.iter().position(|name| *name == wanted).ok_or_else(|| {
+                let message = Message::new("the contract has no output of this name").found(wanted);
+                let message = message.expected(format!("one of {list}"));
+                message.did_you_mean(wanted, names.iter().copied())
+            }),
+        }
     }
 }

@@ -16,9 +16,20 @@ const BEYOND: &str = "No claim is about the sums of the network's layers, which 
 #[must_use]
 pub fn summary(answer: &Answer) -> String {
     let mut lines = vec![sentence(answer)];
+    let mut waiting: Vec<&Claim> = Vec::new();
     for claim in answer.claims.iter().filter(|claim| claim.verdict != Verdict::Proved) {
         let (format, verdict) = (claim.format.name(), claim.verdict.words());
-        lines.push(format!("  {verdict} ({format}): {}", claim.text));
+        // what is missing for one claim is missing for all of its prover: one line, with their number
+        let is_like = |other: &&Claim| is_idle(claim) && is_idle(other) && reason(other) == reason(claim);
+        if waiting.iter().any(is_like) {
+            continue;
+        }
+        waiting.push(claim);
+        let text = match answer.claims.iter().filter(is_like).count() {
+            0 | 1 => claim.text.clone(),
+            count => format!("{count} claims, the first of them: {}", claim.text),
+        };
+        lines.push(format!("  {verdict} ({format}): {text}"));
         lines.extend((!claim.reason.is_empty()).then(|| format!("    {}", claim.reason)));
         lines.extend(claim.details.iter().take(SHOWN).map(|detail| format!("    {detail}")));
         let left = claim.details.len().saturating_sub(SHOWN);
@@ -26,6 +37,15 @@ pub fn summary(answer: &Answer) -> String {
     }
     lines.push(BEYOND.to_owned());
     lines.join("\n")
+}
+
+fn is_idle(claim: &Claim) -> bool {
+    claim.verdict == Verdict::NotRun
+}
+
+/// Whose claim it is, and why it was not run.
+fn reason(claim: &Claim) -> (&str, NumericFormat, &str) {
+    (claim.prover, claim.format, &claim.reason)
 }
 
 fn sentence(answer: &Answer) -> String {
@@ -95,8 +115,7 @@ fn details(open: &[&Claim]) -> Section {
 
 fn claims(format: NumericFormat, own: &[&Claim]) -> Section {
     let mut section = Section::new(format!("Claims in {}", format.name()));
-    let (idle, run): (Vec<&Claim>, Vec<&Claim>) =
-        own.iter().copied().partition(|claim| claim.verdict == Verdict::NotRun);
+    let (idle, run): (Vec<&Claim>, Vec<&Claim>) = own.iter().copied().partition(|claim| is_idle(claim));
     let mut subjects: Vec<&str> = run.iter().map(|claim| claim.subject.as_str()).collect();
     subjects.dedup();
     for subject in subjects {

@@ -1,6 +1,6 @@
 //! The interpreter at work: one measurement at a time, or a table of them.
 
-use interp::{Controller as Interpreter, Real, Sample, Trace};
+use interp::{Coefficients, Controller as Interpreter, Real, Sample, Trace};
 use numpy::ndarray::{ArrayView1, ArrayView2};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use policy::{Policy, Scalar};
@@ -64,10 +64,14 @@ impl<T: Real> Running<T> {
         }
     }
 
-    fn step(&mut self, samples: &[Sample]) -> Result<Command, Message> {
+    fn step(&mut self, samples: &[Sample], output: usize) -> Result<Command, Message> {
         let stepped = self.interpreter.step_into(samples, &mut self.trace);
         stepped.map_err(|error| Message::new(error.to_string()))?;
-        Ok(Command::from(&self.trace.command))
+        Ok(Command::from(&self.trace.decision(output).command))
+    }
+
+    fn commands(&self) -> Vec<Command> {
+        self.trace.commands().map(|command| Command::from(&command)).collect()
     }
 
     fn observation(&self) -> Vec<f64> {
@@ -102,6 +106,8 @@ pub struct Controller {
     /// Name of each signal, and whether it arrives as a code.
     signals: Vec<(String, bool)>,
     samples: Vec<Sample>,
+    /// Index of the output whose command a step returns; 0 of a policy with one.
+    output: usize,
 }
 
 /// A number as a signal takes it.
@@ -151,8 +157,8 @@ impl Controller {
         };
         for row in table.rows() {
             self.fill(&row)?;
-            let samples = &self.samples;
-            let command = either!(&mut self.running, running => running.step(samples))?;
+            let (samples, output) = (&self.samples, self.output);
+            let command = either!(&mut self.running, running => running.step(samples, output))?;
             columns.duty.push(command.duty);
             columns.duty_sim.push(command.duty_sim);
             columns.action_index.push(command.action_index);
@@ -179,9 +185,17 @@ type Table<'py> = (
 #[pymethods]
 impl Controller {
     #[new]
-    fn new(policy: &NativePolicy) -> Self {
+    #[pyo3(signature = (policy, output=None))]
+    fn new(policy: &NativePolicy, output: Option<&str>) -> PyResult<Self> {
         let policy = &policy.policy;
-        Self {
+        let output = policy
+            .chosen_output(output)
+            .map_err(|message| match policy.output_names().first() {
+                Some(name) if output.is_none() => raise(message.hint(format!("Controller(policy, output=\"{name}\")"))),
+                _ => raise(message),
+            })?;
+        Ok(Self {
+            output,
             running: match policy.numeric_format.scalar() {
                 Scalar::F32 => Any::F32(Box::new(Running::new(policy))),
                 Scalar::F64 => Any::F64(Box::new(Running::new(policy))),
@@ -192,7 +206,11 @@ impl Controller {
                 .map(|signal| (signal.name.clone(), signal.adc.is_some()))
                 .collect(),
             samples: vec![Sample::Code(0); policy.signals.len()],
-        }
+        })
+    }
+
+    fn commands(&self) -> Vec<Command> {
+        either!(&self.running, running => running.commands())
     }
 
     fn signals(&self) -> Vec<&str> {
@@ -221,8 +239,8 @@ impl Controller {
             return Err(raise(message.expected(self.signals().join(", "))));
         }
         self.fill(&ArrayView1::from(&numbers)).map_err(raise)?;
-        let samples = &self.samples;
-        either!(&mut self.running, running => running.step(samples)).map_err(raise)
+        let (samples, output) = (&self.samples, self.output);
+        either!(&mut self.running, running => running.step(samples, output)).map_err(raise)
     }
 
     fn step_batch<'py>(&mut self, py: Python<'py>, table: PyReadonlyArray2<'py, f64>) -> PyResult<Table<'py>> {
@@ -263,12 +281,14 @@ impl Controller {
     }
 
     fn set_mapping(&mut self, a: f64, b: f64, c: f64, r: Option<f64>) -> bool {
+        let output = self.output;
         match &mut self.running {
             Any::F32(running) => {
                 let [a, b, c] = [a, b, c].map(|x| x as f32);
-                running.interpreter.set_mapping(a, b, c, r.map(|r| r as f32))
+                let r = r.map(|r| r as f32);
+                running.interpreter.set_mapping_of(output, Coefficients { a, b, c, r })
             }
-            Any::F64(running) => running.interpreter.set_mapping(a, b, c, r),
+            Any::F64(running) => running.interpreter.set_mapping_of(output, Coefficients { a, b, c, r }),
         }
     }
 

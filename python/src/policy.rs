@@ -9,7 +9,7 @@ use codegen::Output;
 use policy::{NumericFormat, Policy};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use toml_input::messages;
+use toml_input::{Message, messages};
 use verify::drift::Drift;
 use verify::traces::Recorded;
 use verify::{Folder, Options, text};
@@ -93,7 +93,7 @@ impl NativePolicy {
             emit: outputs(&emit)?,
             kit_steps: kit_steps.unwrap_or(verify::kit::DEFAULT_STEPS),
             costs,
-            clock: clock.map_err(|error| raise(toml_input::Message::new(error)))?,
+            clock: clock.map_err(|error| raise(Message::new(error)))?,
             golden_decisions,
         };
         let files = py.detach(|| api::compile(&self.policy, &request)?.into_files());
@@ -143,6 +143,14 @@ impl NativePolicy {
         boxes: u32,
         seed: u64,
     ) -> PyResult<(BTreeMap<String, String>, String)> {
+        let names = self.policy.output_names();
+        if !names.is_empty() {
+            let message = Message::new("a certificate is of one duty, and this contract has several outputs");
+            let message = message.found(format!("outputs {}", names.join(", ")));
+            return Err(raise(
+                message.hint("`policyc new MODEL --output N` writes a contract for one of them"),
+            ));
+        }
         let request = CertifyRequest {
             axis,
             at,

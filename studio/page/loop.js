@@ -40,10 +40,10 @@ export class Loop {
   }
 
   request() {
-    const { contract, format, plant } = this.studio;
+    const { contract, format, output, plant } = this.studio;
     const load = this.load ?? { unit: "W", steps: this.studio.steps ?? [[200, 500], [200, 800], [200, 1000], [500, 200], [800, 200], [1000, 200]], beside: ["pid"], after: 150 };
     this.load = load;
-    return { ask: "loop", contract, format, plant, set: [...this.set], v_ref: this.studio.vRef ?? null, unit: load.unit, steps: load.steps, beside: load.beside, limit: true, after: load.after };
+    return { ask: "loop", contract, format, output, plant, set: [...this.set], v_ref: this.studio.vRef ?? null, unit: load.unit, steps: load.steps, beside: load.beside, limit: true, after: load.after };
   }
 
   async show() {

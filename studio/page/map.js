@@ -93,7 +93,7 @@ export class DecisionMap {
     const [x, y] = [axis(this.x), axis(this.y)];
     for (const [name, label] of this.rest) label.hidden = [x.signal, y.signal].includes(name);
     const others = this.rest.map(([name, , input]) => [name, Number(input.value)]);
-    const answer = await studio.compiler.ask({ ask: "map", contract: studio.contract, format: studio.format, x, y, at: others });
+    const answer = await studio.compiler.ask({ ask: "map", contract: studio.contract, format: studio.format, output: studio.output, x, y, at: others });
     if (answer.faults) return at("map").replaceChildren(...faults(answer.faults));
     this.paint(answer, x, y);
   }

@@ -31,7 +31,7 @@ export function whole(studio, loop) {
     button.disabled = true;
     try {
       if (scenario === OWN) await studio.compiler.put(OWN, encode(text(loop, studio)));
-      const answer = await studio.busy("simulating", { ask: "simulate", contract: studio.contract, format: studio.format, scenario });
+      const answer = await studio.busy("simulating", { ask: "simulate", contract: studio.contract, format: studio.format, output: studio.output, scenario });
       if (scenario === OWN && answer.made) answer.made[OWN] = studio.compiler.files.get(OWN);
       out.replaceChildren(...(answer.faults ? faults(answer.faults)
         : [make("pre", { tabindex: "0" }, answer.summary), ...fileList(answer.made), report(decode(answer.made["report.html"]))]));

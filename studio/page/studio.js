@@ -36,6 +36,8 @@ class Studio {
 
   get contract() { return at("contract").value; }
   get format() { return at("format").value || null; }
+  /** Of a contract with several outputs the one that drives the plant. */
+  get output() { return at("of-output").hidden ? null : at("output").value; }
   get plant() { return at("plant").value; }
 
   /// Paths of a kind.
@@ -78,6 +80,7 @@ class Studio {
     at("contract").addEventListener("change", () => this.other());
     at("plant").addEventListener("change", () => this.other());
     at("format").addEventListener("change", () => { this.loop.answer = null; this.read(); });
+    at("output").addEventListener("change", () => { this.loop.answer = null; this.read(); });
     at("edit").addEventListener("input", () => this.edited());
     at("save").addEventListener("click", () => download(this.contract, this.compiler.files.get(this.contract)));
     at("compile").addEventListener("click", () => this.compile());
@@ -257,8 +260,10 @@ class Studio {
       return this.refresh();
     }
     this.policy = answer;
+    at("of-output").hidden = !answer.outputs.length;
+    choose(at("output"), answer.outputs.map((name) => [name, name]));
     at("verdict").className = `verdict ${answer.different ? "fail" : "pass"}`;
-    at("verdict").textContent = answer.different ?? `${answer.name} is sound: ${answer.features} features, ${answer.actions ? `${answer.actions} actions` : "one commanded number"}, ${answer.format}.`;
+    at("verdict").textContent = answer.different ?? `${answer.name} is sound: ${answer.features} features, ${answer.outputs.length ? `${answer.outputs.length} outputs` : answer.actions ? `${answer.actions} actions` : "one commanded number"}, ${answer.format}.`;
     at("faults").replaceChildren(...(this.said ?? []).map((said) => make("p", { class: "dim" }, said)));
     at("inspect").textContent = answer.inspect;
     this.refresh();

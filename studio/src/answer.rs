@@ -10,6 +10,9 @@ pub struct Contract {
     pub contract: String,
     /// Name of a numeric format.
     pub format: Option<String>,
+    /// Name of the output that drives the plant or is shown, of a contract with several.
+    #[serde(default)]
+    pub output: Option<String>,
 }
 
 /// A fault and where it is.

@@ -15,6 +15,7 @@ use crate::session::{self, Reply, Session, Tell};
 pub(crate) fn load(session: &Session, of: &Contract) -> Result<Policy, Faults> {
     let options = ReadOptions {
         files: Some(session.files().clone()),
+        several_outputs: true,
         ..ReadOptions::default()
     };
     let policy = policy::load_with(Path::new(&of.contract), &options)?;
@@ -80,6 +81,8 @@ struct Shown<'p> {
     signals: &'p [policy::Signal],
     features: usize,
     actions: usize,
+    /// Names of several outputs; none where there is one.
+    outputs: Vec<&'p str>,
 }
 
 /// The contract as `inspect` shows it.
@@ -95,6 +98,7 @@ pub(crate) fn read(session: &Session, request: &Value, _: Tell) -> Result<Reply,
         signals: &policy.signals,
         features: policy.features.len(),
         actions: policy.actions().len(),
+        outputs: policy.output_names(),
     })
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use closed_loop::baselines::Kind;
 use closed_loop::scenario::{Metrics, Record, Task};
 use closed_loop::simulation::{Setting, simulate as run};
-use closed_loop::{Course, LoadKind, LoadStep, Named, Scenario, interpreter};
+use closed_loop::{Course, LoadKind, LoadStep, Named, Scenario, interpreter_driving};
 use plant::Parameters;
 use policy::Policy;
 use serde::{Deserialize, Serialize};
@@ -92,10 +92,11 @@ impl Curve {
 
 /// Load steps at one instant each.
 pub(crate) fn step(session: &Session, request: &Value, _: Tell) -> Result<Reply, Faults> {
-    let policy = load(session, &read::<Contract>(request)?)?;
-    let setting = setting(session, &read(request)?, policy)?;
+    let of = read::<Contract>(request)?;
+    let policy = load(session, &of)?;
+    let setting = setting(session, &read(request)?, policy, of.output)?;
     let before = 20.0 * setting.policy.sample_period;
-    let named = vec![interpreted(&setting.policy)?];
+    let named = vec![interpreted(&setting)?];
     let found = run(setting, named, &mut |_| Ok(()))?;
     let steps = found.steps.iter().map(|step| OneStep {
         from: step.step.values[0],
@@ -118,7 +119,7 @@ pub(crate) fn step(session: &Session, request: &Value, _: Tell) -> Result<Reply,
     })
 }
 
-fn setting(session: &Session, step: &Step, policy: Policy) -> Result<Setting, Faults> {
+fn setting(session: &Session, step: &Step, policy: Policy, output: Option<String>) -> Result<Setting, Faults> {
     let kinds = [LoadKind::Power, LoadKind::Current, LoadKind::Resistance];
     let units = kinds.map(LoadKind::unit);
     let kind = kinds.into_iter().find(|kind| kind.unit() == step.unit);
@@ -141,6 +142,7 @@ fn setting(session: &Session, step: &Step, policy: Policy) -> Result<Setting, Fa
     let scenario = Scenario {
         set: within(&step.set)?,
         v_ref: step.v_ref,
+        output,
         load_steps: (step.steps.iter())
             .map(|values| LoadStep {
                 kind,
@@ -178,10 +180,10 @@ fn within(set: &[(String, f64)]) -> Result<Vec<(String, f64)>, Faults> {
     Ok(set.to_vec())
 }
 
-fn interpreted(policy: &Policy) -> Result<Named, Faults> {
+fn interpreted(setting: &Setting) -> Result<Named, Faults> {
     Ok(Named {
         name: "interpreter".to_owned(),
-        controller: interpreter(policy)?,
+        controller: interpreter_driving(&setting.policy, setting.output)?,
     })
 }
 
@@ -200,10 +202,13 @@ struct Simulated {
 /// All that `policyc simulate` writes.
 pub(crate) fn simulate(session: &Session, request: &Value, tell: Tell) -> Result<Reply, Faults> {
     let Wanted { scenario: file } = read(request)?;
-    let scenario = Scenario::load(session.named(&file))?;
-    let policy = load(session, &read::<Contract>(request)?)?;
+    let of = read::<Contract>(request)?;
+    let mut scenario = Scenario::load(session.named(&file))?;
+    // what the file says counts, as the page shows the file
+    scenario.output = scenario.output.or(of.output.clone());
+    let policy = load(session, &of)?;
     let setting = Setting::new(Path::new(&file), scenario, policy, None)?;
-    let named = vec![interpreted(&setting.policy)?];
+    let named = vec![interpreted(&setting)?];
     let found = run(setting, named, &mut |what| {
         tell(&what.to_string());
         Ok(())

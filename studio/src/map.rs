@@ -1,6 +1,6 @@
 //! The decision map: the policy's duty over two of its signals.
 
-use closed_loop::{DecisionMap, decision_map};
+use closed_loop::{DecisionMap, decision_map_of, driving};
 use policy::Policy;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -64,6 +64,7 @@ struct Map {
 pub(crate) fn map(session: &Session, request: &Value, _: Tell) -> Result<Reply, Faults> {
     let (of, wanted) = (read::<Contract>(request)?, read::<Wanted>(request)?);
     let policy = load(session, &of)?;
+    let output = driving(of.output.as_deref(), &policy, of.contract.as_ref())?;
     let axes = [wanted.x.index(&policy)?, wanted.y.index(&policy)?];
     if axes[0] == axes[1] {
         return Err(Message::new("a map needs two signals").found(&wanted.x.signal).into());
@@ -75,6 +76,6 @@ pub(crate) fn map(session: &Session, request: &Value, _: Tell) -> Result<Reply, 
     let rest: Vec<f64> = policy.signals.iter().map(given).collect();
     let axis = |index: usize, axis: &Axis| (index, (0..axis.cells).map(|cell| axis.centre(cell)).collect());
     let [x, y] = [axis(axes[0], &wanted.x), axis(axes[1], &wanted.y)];
-    let DecisionMap { duties, actions } = decision_map(&policy, &x, &y, &rest)?;
+    let DecisionMap { duties, actions } = decision_map_of(&policy, output, &x, &y, &rest)?;
     Reply::of(&Map { duties, actions })
 }

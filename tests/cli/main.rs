@@ -25,6 +25,7 @@ mod replay;
 mod replayed_clips;
 mod replayed_duties;
 mod replayed_filters;
+mod several;
 mod shell;
 mod simulate;
 mod studio;

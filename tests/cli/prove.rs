@@ -22,6 +22,22 @@ fn provers_that_are_missing_are_named_with_the_command_that_installs_them() {
     assert!(said.contains("pip install bitwuzla"), "{said}");
     let proof: Value = serde_json::from_str(&desk.read("proof/proof.json")).unwrap();
     assert_eq!(proof.pointer("/holds"), Some(&Value::Bool(false)), "nothing is proved");
+    // each goal is a claim that waits for a solver, and one line says how many
+    let goals = tests::tools::listing(&desk.path("proof"));
+    let goals = goals.iter().filter(|name| name.ends_with(".smt2")).count();
+    assert!(goals > 10, "{goals}");
+    assert!(
+        said.contains(&format!("not run (f32): {goals} claims, the first of them: ")),
+        "{said}"
+    );
+    assert_eq!(said.matches("pip install bitwuzla").count(), 1, "{said}");
+    let claims = proof.pointer("/claims").and_then(Value::as_array).unwrap();
+    let waiting = claims.iter().filter(|claim| claim["prover"] == "smt").count();
+    assert_eq!(waiting, goals);
+    assert!(
+        said.contains(&format!("of {} claims {} not run", claims.len(), claims.len())),
+        "{said}"
+    );
     // the goals are there for a solver of one's own
     let goal = desk.read("proof/f32-c.duty.smt2");
     assert!(goal.contains("(check-sat)"), "{goal}");

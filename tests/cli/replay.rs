@@ -143,6 +143,31 @@ fn replay_does_not_invent_a_reason() {
     assert!(line.contains("no simple relation"), "{line}");
 }
 
+/// A column that a logger wrote one row late: all features of it differ, and none of them is to blame.
+#[test]
+fn replay_names_the_column_that_is_late_and_not_what_is_made_of_it() {
+    let rows = environment();
+    let mut late = rows.clone();
+    for (k, row) in late.iter_mut().enumerate() {
+        row.samples[0] = rows[if k % 60 == 0 { k } else { k - 1 }].samples[0];
+    }
+    let ran = desk(&late).type_in("replay buck12 log.csv");
+    assert_eq!(ran.code, Some(1), "{}{}", ran.stdout, ran.stderr);
+    assert!(ran.stdout.contains("v_out: logged one row late"), "{}", ran.stdout);
+    let verdict = "DIFFERENT: `v_out` is logged one row late, and nothing else differs";
+    assert!(ran.stdout.contains(verdict), "{}", ran.stdout);
+    for name in ["e", "e_del", "v", "v_del"] {
+        assert!(!ran.stdout.contains(&format!("{name}: first other")), "{}", ran.stdout);
+    }
+    // with another fault beside it, it is one reason among others
+    for row in &mut late {
+        row.observation[2] *= 2.0;
+    }
+    let ran = desk(&late).type_in("replay buck12 log.csv");
+    assert!(!ran.stdout.contains("one row late"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("de_dt: first other"), "{}", ran.stdout);
+}
+
 #[test]
 fn replay_compares_actions_unless_the_trainer_explored() {
     let desk = desk(&environment());

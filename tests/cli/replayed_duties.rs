@@ -81,6 +81,29 @@ fn a_duty_before_a_row_is_that_of_the_row_before() {
     );
 }
 
+/// Duties that are worked out from a column which came late are others for that reason alone.
+#[test]
+fn a_duty_before_that_was_logged_late_does_not_accuse_the_duties() {
+    let before = |row: usize| match row % 15 {
+        0 => 0.5,
+        _ => DUTIES[action(row - 1)],
+    };
+    let late = |row: usize| before(if row.is_multiple_of(15) { row } else { row - 1 });
+    for name in ["obs_d", "previous_duty"] {
+        // beside the column that shows it, the feature in its own right
+        let head = format!(",{name}{}", if name == "obs_d" { "" } else { ",obs_d" });
+        let text = log(&head, |row| match name {
+            "obs_d" => format!(",{}", late(row)),
+            _ => format!(",{},{}", late(row), before(row)),
+        });
+        let (code, text) = said(&text, &format!("{REPLAY} --skip 1"));
+        assert_eq!(code, Some(1), "{text}");
+        let column = if name == "obs_d" { "d" } else { name };
+        assert!(text.contains(&format!("{column}: logged one row late")), "{text}");
+        assert!(!text.contains("are others"), "{text}");
+    }
+}
+
 #[test]
 fn first_rows_of_episodes_can_be_left_out() {
     // the environment begins with another duty than the contract, which begins with the fallback's 0

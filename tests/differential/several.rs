@@ -5,8 +5,8 @@ use policy::{Head, NumericFormat, Policy};
 use super::{COMPILERS, assert_equal, run};
 
 fn load(seed: u64) -> (tests::random::Folder, Policy) {
-    let folder = tests::several::policy(seed).unwrap();
-    let policy = policy::load_with(&folder.path(), &tests::several::options());
+    let folder = tests::random::several::policy(seed).unwrap();
+    let policy = policy::load_with(&folder.path(), &tests::random::several::options());
     let policy = policy.unwrap_or_else(|faults| panic!("{}\n{faults}", folder.contract));
     (folder, policy)
 }

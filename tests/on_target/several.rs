@@ -12,12 +12,12 @@ const STEPS: u64 = 200;
 fn check(name: &str, levels: &[&str]) {
     let target = target(name);
     let mixed = |seed: &u64| {
-        let folder = tests::several::policy(*seed).unwrap();
+        let folder = tests::random::several::policy(*seed).unwrap();
         folder.contract.contains("continuous = ") && folder.contract.contains("duties = ")
     };
     let seed = (0..).find(mixed).unwrap();
-    let folder = tests::several::policy(seed).unwrap();
-    let policy = policy::load_with(&folder.path(), &tests::several::options());
+    let folder = tests::random::several::policy(seed).unwrap();
+    let policy = policy::load_with(&folder.path(), &tests::random::several::options());
     let policy = policy.unwrap_or_else(|faults| panic!("{}\n{faults}", folder.contract));
     for format in [NumericFormat::F32, NumericFormat::I16] {
         let report = run(

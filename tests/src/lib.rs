@@ -3,7 +3,6 @@
 pub mod browser;
 pub mod fixture;
 pub mod random;
-pub mod several;
 pub mod shards;
 pub mod tools;
 

@@ -1,6 +1,8 @@
 //! Policies drawn at random from a seed, for tests and fuzz targets: every kind of signal, feature, filter, activation, action, mapping and limit,
 //! with ties, zeros of both signs and subnormal weights.
 
+pub mod several;
+
 use std::fmt::Write;
 
 use policy::Activation;

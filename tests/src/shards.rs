@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::{self, Write as _};
 use std::path::Path;
 
-use policy::NumericFormat;
+use policy::{NumericFormat, Policy, ReadOptions};
 use toml_input::Faults;
 use verify::Options;
 use verify::shards::{self, Entry, Head, Shard};
@@ -27,6 +27,31 @@ pub const MERGED: &str = "random.csv";
 
 const COLUMNS: &str = "seed,format,compiler,builds,checksum,outcome";
 
+/// Which policies a seed stands for. Each family has seeds of its own: those of one stay what they are whatever another draws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Family {
+    /// One output, every head.
+    One,
+    /// Two to four outputs.
+    Several,
+}
+
+impl Family {
+    /// The policy of that seed, read as it is on disk.
+    fn policy(self, seed: u64) -> Result<Policy, String> {
+        let folder = match self {
+            Family::One => crate::random::policy(seed),
+            Family::Several => crate::random::several::policy(seed),
+        };
+        let folder = folder.map_err(|error| format!("not written: {error}"))?;
+        let options = match self {
+            Family::One => ReadOptions::default(),
+            Family::Several => crate::random::several::options(),
+        };
+        policy::load_with(&folder.path(), &options).map_err(|faults| format!("refused: {faults}"))
+    }
+}
+
 /// What a run compares: seeds from `first` on, every `count`-th of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Plan {
@@ -38,6 +63,8 @@ pub struct Plan {
     pub steps: u64,
     /// Which part of them.
     pub shard: Shard,
+    /// What the seeds stand for.
+    pub family: Family,
 }
 
 impl Plan {
@@ -48,7 +75,11 @@ impl Plan {
 
     /// A file with another one is of another run.
     fn head(self) -> Head {
-        Head::new(&format!("{} steps a policy", self.steps), COLUMNS)
+        let of = match self.family {
+            Family::One => "",
+            Family::Several => ", several outputs",
+        };
+        Head::new(&format!("{} steps a policy{of}", self.steps), COLUMNS)
     }
 }
 
@@ -114,7 +145,7 @@ impl fmt::Display for Row {
 
 /// Compares the policy of a seed in its turn's format with its turn's compiler, at all its levels.
 #[must_use]
-pub fn compare(seed: u64, steps: u64) -> Row {
+pub fn compare(family: Family, seed: u64, steps: u64) -> Row {
     let format = FORMATS[(seed % 5) as usize];
     let compiler = COMPILERS[(seed % 3) as usize];
     let row = |builds: usize, checksum: &str, outcome: &str| Row {
@@ -126,13 +157,9 @@ pub fn compare(seed: u64, steps: u64) -> Row {
         // a message of a compiler would break the line
         outcome: outcome.replace([',', '\n', '\r'], ";"),
     };
-    let folder = match crate::random::policy(seed) {
-        Ok(folder) => folder,
-        Err(error) => return row(0, "", &format!("not written: {error}")),
-    };
-    let policy = match policy::load(&folder.path()) {
+    let policy = match family.policy(seed) {
         Ok(policy) => policy.with_format(format),
-        Err(faults) => return row(0, "", &format!("refused: {faults}")),
+        Err(why) => return row(0, "", &why),
     };
     let options = Options {
         steps,

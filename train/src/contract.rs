@@ -53,6 +53,8 @@ struct Sketch {
     golden: Option<String>,
     mapping: Option<String>,
     inline: bool,
+    /// Names of several outputs.
+    several: Vec<String>,
 }
 
 impl Contract {
@@ -82,6 +84,9 @@ impl Contract {
         let read = |path: &Path| std::fs::read(path).map_err(|error| Error::from(of_file(path, &error)));
         let text = String::from_utf8_lossy(&read(path)?).into_owned();
         let sketch = sketch(&text);
+        if !sketch.several.is_empty() {
+            return Err(Fault::in_file(path, several(&sketch.several)).into());
+        }
         let mut beside = Files::new();
         if let Some(mapping) = &sketch.mapping {
             let folder = path.parent().unwrap_or(Path::new(""));
@@ -227,7 +232,36 @@ fn sketch(text: &str) -> Sketch {
         golden: entry("network", "golden").and_then(string).map(|(name, _)| name),
         mapping: entry("mapping", "file").and_then(string).map(|(name, _)| name),
         inline,
+        several: names_of(root.get("output").map(Spanned::get_ref)),
     }
+}
+
+/// Names of `[[output]]`; of an entry without one a question mark.
+fn names_of(list: Option<&DeValue<'_>>) -> Vec<String> {
+    let Some(DeValue::Array(items)) = list else {
+        return Vec::new();
+    };
+    let name = |item: &Spanned<DeValue<'_>>| match item.get_ref() {
+        DeValue::Table(entries) => match entries.get("name")?.get_ref() {
+            DeValue::String(text) => Some(text.to_string()),
+            _ => None,
+        },
+        _ => None,
+    };
+    items
+        .iter()
+        .map(|item| name(item).unwrap_or_else(|| "?".to_owned()))
+        .collect()
+}
+
+fn several(names: &[String]) -> Message {
+    Message::new("a training here is one of one duty, and this contract has several outputs")
+        .found(format!("outputs {}", names.join(", ")))
+        .expected("[actions] at the top level")
+        .hint(
+            "train a policy for each output, in a contract without [[output]]; or train all in one network with a library, and read what \
+             it saved: policyc new model.zip",
+        )
 }
 
 /// The contract with its golden vectors named beside the weights.

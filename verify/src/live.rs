@@ -32,8 +32,10 @@ pub struct Live {
     runner: ProcessRunner,
     layout: Layout,
     words: Vec<u32>,
-    /// Places of duty, action, status and purity in the answer to a step.
+    /// Places of the first duty, the first action, status and purity in the answer to a step.
     places: [usize; 4],
+    /// Duties of a command: one for each output.
+    duties: usize,
     /// Holds the program until it has ended.
     _folder: tempfile::TempDir,
 }
@@ -83,8 +85,10 @@ impl Live {
         }
         // the layout depends on the kind of the event alone
         let step = layout.answer(&Event::Step(Vec::new()));
-        let place = |name: &str| step.iter().position(|word| word.name == name);
-        let places = match ["duty", "action_index", "status", "purity of eval"].map(place) {
+        // of several outputs each of these words has the output's name behind it, and the first counts
+        let is = |word: &str, name: &str| word.split_once(' ').map_or(word, |(stem, _)| stem) == name || word == name;
+        let place = |name: &str| step.iter().position(|word| is(&word.name, name));
+        let places = match ["duty", "action_index", "status", "purity"].map(place) {
             [Some(a), Some(b), Some(c), Some(d)] => [a, b, c, d],
             _ => return Err(Message::new("internal fault: the answer to a step lacks a word").into()),
         };
@@ -94,6 +98,7 @@ impl Live {
             layout,
             words: Vec::new(),
             places,
+            duties: policy.paths().len(),
             _folder: folder,
         })
     }
@@ -112,24 +117,36 @@ impl Live {
         self.ask(&Event::Init).map(|_| ())
     }
 
-    /// One control step; one sample per signal.
+    /// One control step; one sample per signal. Of several outputs the first.
     ///
     /// # Errors
     /// If the program does not answer, or its `eval` and `commit` contradict its `step`.
     pub fn step(&mut self, samples: &[Sample]) -> Result<LiveCommand, Faults> {
+        let all = self.step_all(samples)?;
+        let first = all.first().copied();
+        first.ok_or_else(|| Message::new("internal fault: a command without a duty").into())
+    }
+
+    /// [`Live::step`] with a command for each output, in their order.
+    ///
+    /// # Errors
+    /// As [`Live::step`].
+    pub fn step_all(&mut self, samples: &[Sample]) -> Result<Vec<LiveCommand>, Faults> {
         let answer = self.ask(&Event::Step(samples.to_vec()))?;
         let [duty, action, status, purity] = self.places;
-        // duty and duty_sim stand before the action; the first of them is the command
-        let number = protocol::numbers(self.layout.scalar(), &answer[duty..action]);
-        let [action, status, purity] = [action, status, purity].map(|place| answer[place]);
+        // the duties stand before those without mapping, and these before the actions
+        let numbers = protocol::numbers(self.layout.scalar(), &answer[duty..action]);
+        let actions = &answer[action..status];
+        let [status, purity] = [status, purity].map(|place| answer[place]);
         if purity != 0 {
             return Err(Message::new(format!("{}: eval and commit contradict step", self.name)).into());
         }
-        Ok(LiveCommand {
-            duty: number.first().copied().unwrap_or_default(),
-            action_index: action,
+        let command = |(duty, action): (&f64, &u32)| LiveCommand {
+            duty: *duty,
+            action_index: *action,
             status,
-        })
+        };
+        Ok(numbers.iter().take(self.duties).zip(actions).map(command).collect())
     }
 
     fn ask(&mut self, event: &Event) -> Result<Vec<u32>, Faults> {

@@ -182,6 +182,9 @@ pub struct Transfer {
     /// policy.toml with a mapping, or the folder that holds it
     #[arg(long, value_name = "POLICY")]
     pub policy: PathBuf,
+    /// Which of several outputs of the policy drives the converters, in the place of the scenario's `output`
+    #[arg(long, value_name = "NAME")]
+    pub output: Option<String>,
     /// "Real" converters; several separated by commas
     #[arg(long, value_name = "FILE", required = true, value_delimiter = ',')]
     pub real: Vec<PathBuf>,

@@ -287,6 +287,9 @@ pub struct Simulate {
     /// Plant file in the place of the scenario's
     #[arg(long, value_name = "PLANT")]
     pub plant: Option<PathBuf>,
+    /// Which of several outputs of the policy drives the plant, in the place of the scenario's `output`
+    #[arg(long, value_name = "NAME")]
+    pub output: Option<String>,
     /// Design the classical controllers on this plant file, not on the plant they run on
     #[arg(long, value_name = "PLANT")]
     pub designed_on: Option<PathBuf>,
@@ -380,6 +383,9 @@ pub struct Diagnose {
     /// Load steps of the closed loop, as for `simulate`; without it from the records' loads
     #[arg(long, value_name = "FILE", requires = "policy")]
     pub scenario: Option<PathBuf>,
+    /// Which of several outputs of the policy drives the converter, in the place of the scenario's `output`
+    #[arg(long, value_name = "NAME", requires = "policy")]
+    pub output: Option<String>,
     /// The converter that the policy was trained on; without it the model
     #[arg(long, value_name = "PLANT", requires = "policy")]
     pub trained_on: Option<PathBuf>,

@@ -60,10 +60,11 @@ pub fn load_several_as(path: &Path, outside: Outside, format: Option<NumericForm
     })
 }
 
-/// [`load`] without the golden vectors.
+/// [`load`] of a contract with one output or several, without the golden vectors.
 fn load_without_golden(path: &Path, outside: Outside) -> Result<Policy, Failure> {
     let options = ReadOptions {
         without_golden: true,
+        several_outputs: true,
         ..options(outside)
     };
     Ok(policy::load_with(&contract_path(path), &options)?)

@@ -26,8 +26,18 @@ pub fn run(options: &Replay) -> Result<Outcome, Failure> {
     let log = Log::open(&policy, &options.log, &options.map.join(","))?;
     if !log.compares() {
         let message = Message::new("the log has nothing to compare with").found(log.columns());
+        let action = match policy.output_names().as_slice() {
+            [] => "`action`".to_owned(),
+            names => names
+                .iter()
+                .map(|name| format!("`action_{name}`"))
+                .collect::<Vec<_>>()
+                .join(", "),
+        };
         return Err(message
-            .expected("columns `obs_0`, `obs_1`, ... in the network's order, or `action`, beside the signals")
+            .expected(format!(
+                "columns `obs_0`, `obs_1`, ... in the network's order, or {action}, beside the signals"
+            ))
             .hint("columns of other names: --map obs_0=NAME,obs_1=NAME,action=NAME")
             .into());
     }

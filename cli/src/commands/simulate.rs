@@ -70,8 +70,11 @@ pub fn check(options: &Simulate) -> Result<(), Failure> {
 
 /// What is simulated.
 fn setting(options: &Simulate) -> Result<Setting, Failure> {
-    let scenario = Scenario::load(&options.scenario)?;
-    let policy = super::load_as(&options.policy, options.outside, options.format)?;
+    let mut scenario = Scenario::load(&options.scenario)?;
+    if options.output.is_some() {
+        scenario.output.clone_from(&options.output);
+    }
+    let policy = super::load_several_as(&options.policy, options.outside, options.format)?;
     let plant = options.plant.as_deref().map(FileName::new);
     let setting = Setting::open(&options.scenario, scenario, policy, plant, &opener(options.foreign))?;
     let spread = options
@@ -106,7 +109,7 @@ fn signed(options: &Simulate, found: &Findings) -> Result<BTreeMap<String, Strin
 
 /// Starts the controllers and simulates.
 fn all(options: &Simulate, setting: Setting) -> Result<Findings, Failure> {
-    let named = controllers::start_all(&setting.policy, options.controller, options.check)?;
+    let named = controllers::start_all(&setting.policy, setting.output, options.controller, options.check)?;
     let mut line = ProgressLine::new();
     let found = simulate(setting, named, &mut |what| line.next(what))?;
     line.clear();

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::findings::{Findings, Step};
+use super::findings::{Findings, POLICY, Setting, Step};
+use super::outputs::{self, OutputUse};
 use super::spread::{Json as SpreadJson, Spreads};
 use super::{page, pictures, words};
 use crate::faults::{Error, told};
@@ -20,6 +21,9 @@ pub const PAGE: &str = "report.html";
 struct Json<'a> {
     policy: &'a str,
     controller: &'a str,
+    /// Of several outputs the one that drives the plant.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    output: Option<&'a str>,
     v_ref: f64,
     sample_period: f64,
     load_steps: Vec<JsonStep<'a>>,
@@ -46,6 +50,9 @@ struct JsonStep<'a> {
     load: Option<JsonLoad<'a>>,
     controllers: BTreeMap<&'a str, JsonPair<&'a Metrics>>,
     limits: BTreeMap<&'a str, JsonPair<&'a Bound>>,
+    /// At the first sampling instant.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    outputs: Vec<OutputUse>,
 }
 
 #[derive(Serialize)]
@@ -76,7 +83,11 @@ impl Findings {
             for (name, course) in &step.courses {
                 metrics.controller(name, &course.finding);
                 let file = format!("{stem}-{}.csv", name.replace(' ', "-"));
-                files.insert(file, trajectory_csv(&course.shown, step.step.kind));
+                let beside = match name == POLICY {
+                    true => outputs::names_beside(&self.setting),
+                    false => Vec::new(),
+                };
+                files.insert(file, trajectory_csv(&course.shown, step.step.kind, &beside));
             }
             for (name, limit) in &step.limits {
                 metrics.limit(name, step.step, limit);
@@ -108,10 +119,12 @@ impl Findings {
     pub fn summary(&self) -> String {
         let setting = &self.setting;
         let mut out = format!(
-            "policy  {} in {} ({})\nplant   {}\n\n{}\n",
+            "policy  {} in {} ({})\n{}plant   {}\n\n{}\n",
             setting.policy.name,
             setting.policy.numeric_format.name(),
             self.controller,
+            outputs::drives(&setting.policy, setting.output)
+                .map_or_else(String::new, |text| format!("output  {text}\n")),
             words::plant_text(setting),
             words::explanation(setting).replace(". ", ".\n")
         );
@@ -123,6 +136,7 @@ impl Findings {
             out.push('\n');
             out.push_str(&comparison(step.step, controllers, limits));
             out.push_str(&at_rest(resting));
+            out.push_str(&outputs::table(setting, step));
         }
         if let Some(spread) = &self.spread {
             out.push_str(&format!("\n{}", spread.text()));
@@ -156,9 +170,10 @@ impl Findings {
         Json {
             policy: &setting.policy.name,
             controller,
+            output: setting.policy.output_names().get(setting.output).copied(),
             v_ref: setting.v_ref,
             sample_period: setting.policy.sample_period,
-            load_steps: steps.iter().map(json_step).collect(),
+            load_steps: steps.iter().map(|step| json_step(setting, step)).collect(),
             check: check.as_ref().map(|check| JsonCheck {
                 equal: check.differences.is_empty(),
                 controllers: &check.names,
@@ -176,7 +191,7 @@ fn json(found: &Findings) -> Result<String, Error> {
     Ok(format!("{text}\n"))
 }
 
-fn json_step(step: &Step) -> JsonStep<'_> {
+fn json_step<'a>(setting: &Setting, step: &'a Step) -> JsonStep<'a> {
     let ([from, to], unit) = step.step.stepped();
     let controllers = step.courses.iter().map(|(name, course)| {
         let (sample, worst) = (&course.finding.at_sample, &course.finding.worst);
@@ -196,5 +211,6 @@ fn json_step(step: &Step) -> JsonStep<'_> {
         }),
         controllers: controllers.collect(),
         limits: limits.collect(),
+        outputs: outputs::outputs(setting, step),
     }
 }

@@ -15,7 +15,7 @@ use crate::limit::{Limit, left_out};
 use crate::load_step::{LoadKind, LoadStep};
 use crate::outside::Open;
 use crate::scenario_file::Scenario;
-use crate::suits::{draws, held_by, holds_power, reaches, suits, v_ref};
+use crate::suits::{draws, driving, held_by, holds_power, reaches, suits, v_ref};
 
 /// Name of the policy among the controllers.
 pub const POLICY: &str = "policy";
@@ -32,6 +32,8 @@ pub struct Setting {
     pub scenario: Scenario,
     /// The policy.
     pub policy: Policy,
+    /// Index of the output whose duty is the plant's; 0 of a policy with one.
+    pub output: usize,
     /// The plant's file.
     pub plant: PathBuf,
     /// The plant, with the scenario's numbers in it.
@@ -123,6 +125,7 @@ impl Setting {
             return Err(Fault::in_file(file, message).into());
         };
         let plant = name.shown.clone();
+        let output = driving(scenario.output.as_deref(), &policy, file)?;
         let converter = load(name, &scenario.set)?;
         let references: Vec<f64> = (scenario.load_steps.iter().filter_map(|step| step.reference))
             .flatten()
@@ -148,6 +151,7 @@ impl Setting {
             notes: notes(&scenario, &policy, &converter, v_ref),
             scenario,
             policy,
+            output,
             plant,
             designed_on: converter.parameters().clone(),
             spread: Vec::new(),

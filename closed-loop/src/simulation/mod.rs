@@ -8,6 +8,7 @@
 
 mod files;
 mod findings;
+mod outputs;
 mod page;
 mod pictures;
 mod runs;
@@ -16,6 +17,7 @@ mod words;
 
 pub use files::PAGE;
 pub use findings::{Check, Findings, POLICY, Setting, Step};
+pub use outputs::OutputUse;
 pub use runs::simulate;
 pub use spread::{Cell, Draws, Spread, Spreads};
 pub use words::band_text;

@@ -2,8 +2,8 @@
 
 use report::{Cell, Page, Section, Svg, Table, Verdict};
 
-use super::findings::{Findings, Step};
-use super::words;
+use super::findings::{Findings, Setting, Step};
+use super::{outputs, words};
 use crate::faults::{Error, told};
 use crate::scenario::Metrics;
 use crate::tables::{AT_REST, COLUMNS, cells, digits, limit_cells, rest_cells, time_digits};
@@ -17,6 +17,8 @@ pub(super) fn page(found: &Findings, drawn: Vec<Svg>, of_spread: Vec<(String, Sv
         ("run by", found.controller.clone()),
         ("plant", words::plant_text(setting)),
     ];
+    let driven = outputs::drives(&setting.policy, setting.output).map(|text| ("output", text));
+    let setup = setup.into_iter().chain(driven);
     let mut about = Section::new("").pairs(setup).text(words::explanation(setting));
     for note in &setting.notes {
         about = about.text(format!("Note: {note}."));
@@ -26,7 +28,13 @@ pub(super) fn page(found: &Findings, drawn: Vec<Svg>, of_spread: Vec<(String, Sv
         .section(about);
     let steps = found.steps.iter().zip(drawn).map(|(step, picture)| {
         let section = Section::new(step.step.to_string()).chart(picture, CAPTION);
-        section.table(table(step)).table(at_rest(step))
+        let section = section.table(table(step)).table(at_rest(step));
+        match setting.policy.output_names().is_empty() {
+            true => section,
+            false => section
+                .table(beside(setting, step))
+                .text(format!("Status of all outputs: {}.", outputs::status_words(step))),
+        }
     });
     page = page.section(Section::new("Load steps").pick("load step", steps.collect()));
     if let Some(spread) = &found.spread {
@@ -104,6 +112,19 @@ fn table(step: &Step) -> Table {
         let blank = std::iter::repeat_n(Cell::from("-"), COLUMNS.len() - 2);
         let cells = [Cell::from(name.as_str()), deviation, settling];
         table = table.row(cells.into_iter().chain(blank));
+    }
+    table
+}
+
+/// What each of several outputs did.
+fn beside(setting: &Setting, step: &Step) -> Table {
+    let mut table = Table::new("").text("outputs, first sampling instant");
+    for heading in outputs::OUTPUTS {
+        table = table.text(heading);
+    }
+    for output in outputs::outputs(setting, step) {
+        let cells = output.cells().into_iter().map(Cell::from);
+        table = table.row([Cell::from(output.called())].into_iter().chain(cells));
     }
     table
 }

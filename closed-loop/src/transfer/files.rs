@@ -127,11 +127,13 @@ fn formula(real: &Real) -> String {
 fn explanation(found: &Findings) -> String {
     let setting = &found.setting;
     let task = &setting.scenario.task;
+    let output = setting.policy.path(setting.output).name;
     format!(
-        "Policy {} ({}) at real converters simulated by {}. True voltages at the sampling instants, errors from {} V, \
+        "Policy {}{} ({}) at real converters simulated by {}. True voltages at the sampling instants, errors from {} V, \
          settled within {}; worst of {} sampling instants / of {} instants and phases. Steady state: the last {} \
          of {} control periods after the step.",
         setting.policy.name,
+        output.map_or_else(String::new, |name| format!(", its output {name}")),
         found.controller,
         found.simulator,
         setting.v_ref,

@@ -12,7 +12,7 @@ use crate::environment::varied;
 use crate::faults::Error;
 use crate::refit::{Refit, needs_mapping};
 use crate::scenario_file::Scenario;
-use crate::suits::{draws, suits, v_ref};
+use crate::suits::{draws, driving, suits, v_ref};
 
 /// Names of the runs.
 pub(super) const SIMULATION: &str = "simulation";
@@ -27,6 +27,8 @@ pub struct Setting {
     pub scenario: Scenario,
     /// The policy, with a mapping.
     pub policy: Policy,
+    /// Index of the output that drives the converters, and whose mapping is fitted; 0 of a policy with one.
+    pub output: usize,
     /// What the policy was trained on.
     pub nominal: Parameters,
     /// Its steady state.
@@ -97,7 +99,8 @@ impl Setting {
     /// If the policy has no mapping, no plant or no voltage to hold is named, the plant's file is none, or policy and plant do
     /// not suit each other.
     pub fn new(file: &Path, scenario: Scenario, policy: Policy) -> Result<Self, Error> {
-        needs_mapping(&policy)?;
+        let output = driving(scenario.output.as_deref(), &policy, file)?;
+        needs_mapping(&policy, output)?;
         let Some(trained_on) = &scenario.plant else {
             let message = Message::new("no plant").expected("the converter that the policy was trained on");
             let message = message.hint("plant = \"../plants/paper-model.toml\"");
@@ -120,6 +123,7 @@ impl Setting {
             trained_on: Losses::of(&nominal)?,
             scenario,
             policy,
+            output,
             nominal,
             v_ref,
         })
@@ -129,6 +133,7 @@ impl Setting {
     pub(super) fn refit(&self) -> Refit<'_> {
         Refit {
             policy: &self.policy,
+            output: self.output,
             nominal: &self.nominal,
             trained_on: self.trained_on,
             v_ref: self.v_ref,

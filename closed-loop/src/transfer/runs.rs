@@ -113,7 +113,7 @@ fn one<E: Environment>(
             inner: unmapped,
             trained_on: setting.trained_on,
             real: Losses::of(real)?,
-            limits: setting.policy.limits.duty,
+            limits: setting.policy.path(setting.output).limits.duty,
         };
         runs.push(run(EXACT, setting, simulated, &mut ideal, progress)?);
     }

@@ -43,12 +43,16 @@ class Steps(NamedTuple):
 class Controller:
     """A policy at work, with the bits of the generated code. One object is one controller with its own state."""
 
-    def __init__(self, policy: Union[Policy, PathLike], format: Optional[str] = None) -> None:
-        """The controller of a policy (or of the one at a path) as switched on, in the policy's numeric format or another."""
+    def __init__(self, policy: Union[Policy, PathLike], format: Optional[str] = None, *, output: Optional[str] = None) -> None:
+        """The controller of a policy (or of the one at a path) as switched on, in the policy's numeric format or another.
+
+        Of a policy with several outputs `output` names the one whose commands :meth:`step` and :meth:`step_batch` return;
+        :attr:`commands` has all of the last step.
+        """
         if not isinstance(policy, Policy):
             policy = Policy.load(policy)
         self.policy = policy if format is None else policy.with_format(format)
-        self._native = _Native(self.policy._native)
+        self._native = _Native(self.policy._native, output)
         #: One control step: the numbers of a measurement in the order of :attr:`signals`, or by name, in the signals' units (ADC
         #: signals: codes). Returns a :class:`Command`.
         self.step = self._native.step
@@ -75,6 +79,11 @@ class Controller:
         if hasattr(measurements, "columns"):
             measurements = np.column_stack([measurements[name] for name in self.signals])
         return Steps(*self._native.step_batch(np.asarray(measurements, dtype=np.float64)))
+
+    @property
+    def commands(self) -> List[Command]:
+        """The command of each output in the last step, in the order of the contract."""
+        return self._native.commands()
 
     @property
     def observation(self) -> np.ndarray:

@@ -9,6 +9,7 @@ fn plan(shard: u64, count: u64) -> Plan {
         policies: 30,
         steps: 5,
         shard: Shard::new(shard, count).unwrap(),
+        family: Family::One,
     }
 }
 

@@ -1,10 +1,10 @@
 //! The duties of a log against those of its actions: an index says nothing of what it commands.
 
-use policy::{Expr, Head, Input, Policy, Residual};
+use policy::{DutyPath, Expr, Head, Policy, Residual};
 use serde::Serialize;
 
 use super::explain::number;
-use super::log::Log;
+use super::log::{Done, Log};
 
 /// What differs by less than this share of the largest duty is the same duty.
 // three digits of a log; neighbours in a table of actions are farther apart
@@ -34,16 +34,26 @@ pub struct DutyResult {
 /// A row of the log, its action, its duty.
 type Pair = (usize, usize, f64);
 
+/// One output of the contract and what a log says of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Logged<'a> {
+    pub policy: &'a Policy,
+    pub path: &'a DutyPath<'a>,
+    pub log: &'a Log,
+    pub done: &'a Done,
+}
+
 /// Compares; `None` where the log does not say which duty an action had. `commanded` is what the contract makes of the action of each
 /// row.
-pub(super) fn duties(policy: &Policy, log: &Log, commanded: &[f64]) -> Option<DutyResult> {
-    let table = match &policy.head {
+pub(super) fn duties(of: Logged<'_>, commanded: &[f64]) -> Option<DutyResult> {
+    let log = of.log;
+    let table = match of.path.head {
         Head::Choice(table) => table,
-        Head::Residual(head) => return added(policy, head, log, commanded),
+        Head::Residual(head) => return added(of, head, commanded),
         Head::Continuous(_) | Head::Schedule(_) | Head::Several(_) => return None,
     };
     let own: Vec<f64> = table.iter().map(|action| action.duty).collect();
-    let (source, derived, pairs) = pairs(policy, log)?;
+    let (source, derived, pairs) = pairs(of)?;
     let largest = own.iter().fold(0.0_f64, |most, duty| most.max(duty.abs()));
     let is_same = |a: f64, b: f64| (a - b).abs() <= SAME * largest;
     let others: Vec<&Pair> = (pairs.iter())
@@ -68,9 +78,10 @@ pub(super) fn duties(policy: &Policy, log: &Log, commanded: &[f64]) -> Option<Du
 
 /// The same where an action adds to a law: what the log has more or less than the contract commands is what its action adds more or
 /// less.
-fn added(policy: &Policy, head: &Residual, log: &Log, commanded: &[f64]) -> Option<DutyResult> {
+fn added(of: Logged<'_>, head: &Residual, commanded: &[f64]) -> Option<DutyResult> {
+    let log = of.log;
     let own: Vec<f64> = head.offsets.iter().map(|action| action.duty).collect();
-    let (source, derived, pairs) = pairs(policy, log)?;
+    let (source, derived, pairs) = pairs(of)?;
     let apart = own
         .iter()
         .enumerate()
@@ -135,12 +146,13 @@ fn rounding(logged: impl Iterator<Item = f64> + Clone, mut commanded: impl Itera
 
 /// The duty before each row, as the log has it: `None` where it does not say. A law may read it, and what an action adds shows only
 /// where the law began at the log's.
-pub(super) fn before(policy: &Policy, log: &Log) -> Vec<Option<f64>> {
-    if let Some(duties) = &log.previous_duty {
+pub(super) fn before(of: Logged<'_>) -> Vec<Option<f64>> {
+    let log = of.log;
+    if let Some(duties) = &of.done.previous_duty {
         return duties.iter().copied().map(Some).collect();
     }
     let mut list = vec![None; log.rows()];
-    if let (Head::Residual(head), Some((_, _, pairs))) = (&policy.head, pairs(policy, log)) {
+    if let (Head::Residual(head), Some((_, _, pairs))) = (of.path.head, pairs(of)) {
         for (row, _, duty) in pairs {
             let goes_on = log.begins.get(row + 1) == Some(&false);
             // another one is no duty that these actions lead to
@@ -154,13 +166,20 @@ pub(super) fn before(policy: &Policy, log: &Log) -> Vec<Option<f64>> {
 }
 
 /// Where the duties of the log's actions stand, and the pairs.
-fn pairs(policy: &Policy, log: &Log) -> Option<(String, bool, Vec<Pair>)> {
-    let actions = log.actions.as_ref()?;
-    let action = |row: usize| Some(*actions.get(row)? as usize);
-    if let Some(duties) = &log.duty {
+fn pairs(of: Logged<'_>) -> Option<(String, bool, Vec<Pair>)> {
+    let Logged {
+        policy,
+        path,
+        log,
+        done,
+    } = of;
+    let actions = done.actions.as_ref()?;
+    let is_said = |row: usize| !log.unsaid.get(row).copied().unwrap_or(false);
+    let action = |row: usize| Some(*actions.get(row).filter(|_| is_said(row))? as usize);
+    if let Some(duties) = &done.duty {
         let pair = |(row, duty): (usize, &f64)| Some((row, action(row)?, *duty));
         return Some((
-            "duty".to_owned(),
+            path.named("duty"),
             false,
             duties.iter().enumerate().filter_map(pair).collect(),
         ));
@@ -170,19 +189,18 @@ fn pairs(policy: &Policy, log: &Log) -> Option<(String, bool, Vec<Pair>)> {
         let goes_on = |row: &usize| !log.begins.get(*row).copied().unwrap_or(true);
         (1..duties.len())
             .filter(goes_on)
+            .filter(|row| is_said(*row))
             .filter_map(|row| Some((row - 1, action(row - 1)?, (*duties.get(row)?)?)))
             .collect()
     };
-    if let Some(duties) = &log.previous_duty {
+    if let Some(duties) = &done.previous_duty {
         let duties = duties.iter().map(|duty| Some(*duty)).collect();
-        return Some(("previous_duty".to_owned(), false, behind(duties)));
+        return Some((path.named("previous_duty"), false, behind(duties)));
     }
     let plain = |index: &usize| {
         let feature = policy.features.get(*index);
         let is_plain = feature.is_some_and(|feature| {
-            matches!(feature.source, Expr::Input(Input::PreviousDuty))
-                && feature.filters.is_empty()
-                && feature.scale != 0.0
+            feature.source == Expr::Input(path.previous_duty) && feature.filters.is_empty() && feature.scale != 0.0
         });
         is_plain && log.observed.get(*index).is_some_and(Option::is_some)
     };

@@ -39,6 +39,12 @@ pub(super) struct Course {
     pub begins: Vec<bool>,
     features: Vec<FeatureCourse>,
     signals: Vec<Vec<f64>>,
+    pub outputs: Vec<OutputCourse>,
+}
+
+/// What it made of one output.
+#[derive(Debug, Clone, Default)]
+pub(super) struct OutputCourse {
     pub actions: Vec<u32>,
     /// What the logged action gives up of Q, as a share of the largest |Q| of its row; empty without logged actions.
     pub lost: Vec<f64>,
@@ -61,10 +67,7 @@ impl Course {
             begins: begins.to_vec(),
             features: vec![FeatureCourse::default(); policy.features.len()],
             signals: vec![Vec::new(); policy.signals.len()],
-            actions: Vec::new(),
-            lost: Vec::new(),
-            duties: Vec::new(),
-            commanded: Vec::new(),
+            outputs: vec![OutputCourse::default(); policy.paths().len()],
         }
     }
 
@@ -77,21 +80,18 @@ impl Course {
         for (course, signal) in self.signals.iter_mut().zip(&trace.signals) {
             course.push(signal.to_f64());
         }
-        self.actions.push(trace.action_index);
-        self.duties.push(trace.duty_sim.to_f64());
+        for (index, output) in self.outputs.iter_mut().enumerate() {
+            let decision = trace.decision(index);
+            output.actions.push(decision.action_index);
+            output.duties.push(decision.duty_sim.to_f64());
+        }
     }
 
-    /// Weighs the logged action by the Q values of the contract.
-    pub fn gives_up<T: Real>(&mut self, trace: &Trace<T>, logged: u32) {
-        let q: Vec<f64> = trace.q_values.iter().map(|q| q.to_f64()).collect();
-        let value = |action: u32| q.get(action as usize).copied().unwrap_or(f64::NAN);
-        let largest = q.iter().fold(f64::MIN_POSITIVE, |largest, q| largest.max(q.abs()));
-        self.lost.push((value(trace.action_index) - value(logged)) / largest);
-    }
-
-    /// What the contract commands by the action that the trainer applied.
+    /// What the contract commands by what the trainer applied.
     pub fn commanded<T: Real>(&mut self, trace: &Trace<T>) {
-        self.commanded.push(trace.command.duty_sim.to_f64());
+        for (index, output) in self.outputs.iter_mut().enumerate() {
+            output.commanded.push(trace.decision(index).command.duty_sim.to_f64());
+        }
     }
 
     /// What the network sees of a feature.
@@ -107,6 +107,15 @@ impl Course {
             age
         };
         self.begins.iter().map(next).collect()
+    }
+}
+
+impl OutputCourse {
+    /// Weighs the logged action by `q`, the Q values of the contract for this output, beside its own choice.
+    pub fn gives_up(&mut self, q: &[f64], [own, logged]: [u32; 2]) {
+        let value = |action: u32| q.get(action as usize).copied().unwrap_or(f64::NAN);
+        let largest = q.iter().fold(f64::MIN_POSITIVE, |largest, q| largest.max(q.abs()));
+        self.lost.push((value(own) - value(logged)) / largest);
     }
 }
 

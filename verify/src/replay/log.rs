@@ -4,7 +4,7 @@ use std::path::Path;
 
 use interp::Sample;
 use measured::{ColumnMap, Located, Options, Quantity, Sheet, table_faults};
-use policy::Policy;
+use policy::{DutyPath, Policy};
 use toml_input::{Fault, Faults, Message};
 
 use super::values::ends;
@@ -24,41 +24,31 @@ pub struct Log {
     pub(super) begins: Vec<bool>,
     /// Per feature what the trainer's network saw, if the log has it.
     pub(super) observed: Vec<Option<Vec<f64>>>,
-    /// The trainer's choice in each row.
-    pub(super) actions: Option<Vec<u32>>,
-    /// What a continuous actor commanded in each row, as a duty before the mapping.
-    pub(super) commanded: Option<Vec<f64>>,
-    /// What the action of each row commanded, if the log says so.
-    pub(super) duty: Option<Vec<f64>>,
-    /// The duty before each row.
-    pub(super) previous_duty: Option<Vec<f64>>,
-    /// What stands behind each row.
-    pub(super) applied: Applied,
+    /// What the trainer did, output by output.
+    pub(super) done: Vec<Done>,
+    /// Rows of which a column says nothing, because it was moved against the others; empty if there are none.
+    pub(super) unsaid: Vec<bool>,
     pub(super) notes: Vec<String>,
 }
 
-/// The duty that follows a row, before a mapping.
+/// What the trainer did with one output.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Applied {
-    /// The policy's own: the log says nothing.
-    Own,
-    /// That of an action.
-    Actions(Vec<u32>),
-    /// A logged one.
-    Duties(Vec<f64>),
+pub(super) struct Done {
+    /// Whether the contract commands a number there.
+    continuous: bool,
+    /// The trainer's choice in each row.
+    pub actions: Option<Vec<u32>>,
+    /// What was commanded in each row, before the mapping, if the log says so.
+    pub duty: Option<Vec<f64>>,
+    /// The duty before each row.
+    pub previous_duty: Option<Vec<f64>>,
 }
 
-/// Columns that say what the trainer did, beside samples and observations.
-const DONE: [Quantity<'static>; 5] = [
-    other("t", &["time"], "s"),
-    other("episode", &["episodes"], ""),
-    other("action", &["actions", "action_index"], ""),
-    other("duty", &[], "1"),
-    other("previous_duty", &[], "1"),
-];
-
-const fn other(name: &'static str, aliases: &'static [&'static str], unit: &'static str) -> Quantity<'static> {
-    Quantity { name, aliases, unit }
+impl Done {
+    /// What a continuous actor commanded in each row, as a duty before the mapping.
+    pub fn commanded(&self) -> Option<&Vec<f64>> {
+        self.duty.as_ref().filter(|_| self.continuous)
+    }
 }
 
 impl Log {
@@ -67,7 +57,7 @@ impl Log {
     /// Columns: every signal by its name, in its unit (as for [`Recorded`](crate::traces::Recorded)). If there: observations as
     /// `obs_0`, `obs_1`, ... in the network's order, or `obs_NAME`, or the feature's name; `action`, from 0; `duty`, what the
     /// action commanded, which of a continuous head is compared in the place of an action; `previous_duty`, where the environment has its own; `episode`, which begins anew where it changes; `t` in
-    /// seconds. `map` says where a column has another name: `v_out=CH1,obs_0=x0`.
+    /// seconds. Of several outputs each has `action_NAME`, `duty_NAME` and `previous_duty_NAME`. `map` says where a column has another name: `v_out=CH1,obs_0=x0`.
     ///
     /// # Errors
     /// A map or a file that cannot be read, a signal without column, cells that are no numbers, rows that are not a control period apart.
@@ -81,10 +71,12 @@ impl Log {
     /// As [`Log::open`].
     pub fn read(policy: &Policy, sheet: Sheet, map: &str) -> Result<Self, Faults> {
         let signals = SignalColumns::new(policy);
-        let observations = observation_names(policy);
+        let names = done_names(policy);
+        let done = done_quantities(&names);
+        let observations = observation_names(policy, &done);
         let mut wanted = signals.quantities();
         wanted.extend(
-            DONE.iter()
+            done.iter()
                 .filter(|done| policy.signals.iter().all(|signal| signal.name != done.name)),
         );
         wanted.extend(observations.iter().map(|names| Quantity {
@@ -105,38 +97,27 @@ impl Log {
         let mut faults = table_faults();
         let mut numbers = |name: &str| located.signal(name).map(|column| column.values(&sheet, &mut faults));
         let episode = numbers("episode");
-        let (time, action) = (numbers("t"), numbers("action"));
-        let (duty, previous_duty) = (numbers("duty"), numbers("previous_duty"));
+        let time = numbers("t");
+        let columns: Vec<[Option<Vec<f64>>; 3]> = names
+            .iter()
+            .map(|names| [0, 1, 2].map(|which| numbers(&names[which])))
+            .collect();
         let observed = observations.iter().map(|names| numbers(names.first()?)).collect();
         faults.propagate()?;
         let begins = begins(sheet.rows(), episode.as_deref());
         if let Some(time) = time {
             check_period(policy, &sheet, &time, &begins)?;
         }
-        let is_continuous = !policy.head.is_choice();
-        if let (true, Some(_), None, Some(column)) = (is_continuous, &action, &duty, located.signal("action")) {
-            return Err(column.fault(&sheet, 0, no_index()).into());
-        }
-        let actions = action
-            .filter(|_| !is_continuous)
-            .map(|action| indices(policy, &sheet, &located, &action))
-            .transpose()?;
-        let commanded = duty.clone().filter(|_| is_continuous);
-        let applied = match (&actions, duty.clone()) {
-            (Some(actions), _) => Applied::Actions(actions.clone()),
-            (None, Some(duties)) => Applied::Duties(duties),
-            (None, None) => Applied::Own,
-        };
+        let done = policy.paths().into_iter().zip(&names).zip(columns);
+        let done = done.map(|((path, names), columns)| of_output(&path, names, columns, &sheet, &located));
+        let done = done.collect::<Result<_, _>>()?;
         let notes = located.notes(&sheet, &[]);
         Ok(Self {
             samples,
             begins,
             observed,
-            actions,
-            commanded,
-            duty,
-            previous_duty,
-            applied,
+            done,
+            unsaid: Vec::new(),
             notes,
             sheet,
         })
@@ -151,7 +132,8 @@ impl Log {
     /// Whether it holds an observation, an action or the duty of a continuous actor to compare with.
     #[must_use]
     pub fn compares(&self) -> bool {
-        self.actions.is_some() || self.commanded.is_some() || self.observed.iter().any(Option::is_some)
+        let done = |done: &Done| done.actions.is_some() || done.commanded().is_some();
+        self.done.iter().any(done) || self.observed.iter().any(Option::is_some)
     }
 
     /// Its columns, for a fault.
@@ -206,7 +188,9 @@ impl Log {
             age = if *begins { 0 } else { age + 1 };
             age >= skip
         };
-        self.begins.iter().map(next).collect()
+        let late: Vec<bool> = self.begins.iter().map(next).collect();
+        let said = |row: usize| !self.unsaid.get(row).copied().unwrap_or(false);
+        late.iter().enumerate().map(|(row, late)| *late && said(row)).collect()
     }
 
     pub(super) fn line(&self, row: usize) -> usize {
@@ -218,11 +202,33 @@ impl Log {
     }
 }
 
+/// What a table calls action, duty and duty before of each output.
+pub(super) fn done_names(policy: &Policy) -> Vec<[String; 3]> {
+    let named = |path: &DutyPath<'_>| ["action", "duty", "previous_duty"].map(|stem| path.named(stem));
+    policy.paths().iter().map(named).collect()
+}
+
+/// Columns that say what the trainer did, beside samples and observations.
+fn done_quantities(names: &[[String; 3]]) -> Vec<Quantity<'_>> {
+    let quantity = |name, aliases, unit| Quantity { name, aliases, unit };
+    let mut done = vec![quantity("t", &["time"], "s"), quantity("episode", &["episodes"], "")];
+    for [action, duty, previous_duty] in names {
+        let aliases: &[&str] = match action.as_str() {
+            "action" => &["actions", "action_index"],
+            _ => &[],
+        };
+        done.push(quantity(action, aliases, ""));
+        done.push(quantity(duty, &[], "1"));
+        done.push(quantity(previous_duty, &[], "1"));
+    }
+    done
+}
+
 /// What a table may call each feature: `obs_e`, `obs_0`, ..., and `e` where that is no other column's name.
-fn observation_names(policy: &Policy) -> Vec<Vec<String>> {
+fn observation_names(policy: &Policy, done: &[Quantity<'_>]) -> Vec<Vec<String>> {
     let taken = |name: &str| {
         let signals = policy.signals.iter().map(|signal| signal.name.as_str());
-        let known = Quantity::find(name).is_some() || DONE.iter().any(|done| done.name == name);
+        let known = Quantity::find(name).is_some() || done.iter().any(|done| done.name == name);
         known || signals.into_iter().any(|signal| signal == name)
     };
     let names = |(index, feature): (usize, &policy::Feature)| {
@@ -275,14 +281,35 @@ fn no_index() -> Message {
         .hint("an action in units of the trainer's action space becomes a duty by scale and offset of [actions]")
 }
 
-fn indices(policy: &Policy, sheet: &Sheet, located: &Located, values: &[f64]) -> Result<Vec<u32>, Faults> {
+/// What the columns of one output say: action, duty, duty before.
+fn of_output(
+    path: &DutyPath<'_>,
+    [name, ..]: &[String; 3],
+    [action, duty, previous_duty]: [Option<Vec<f64>>; 3],
+    sheet: &Sheet,
+    located: &Located,
+) -> Result<Done, Faults> {
+    let continuous = !path.head.is_choice();
+    if let (true, Some(_), None, Some(column)) = (continuous, &action, &duty, located.signal(name)) {
+        return Err(column.fault(sheet, 0, no_index()).into());
+    }
+    let actions = action.filter(|_| !continuous);
+    let indices = actions.map(|action| indices(path.head.actions().len(), name, sheet, located, &action));
+    Ok(Done {
+        continuous,
+        actions: indices.transpose()?,
+        duty,
+        previous_duty,
+    })
+}
+
+fn indices(most: usize, name: &str, sheet: &Sheet, located: &Located, values: &[f64]) -> Result<Vec<u32>, Faults> {
     let mut faults = table_faults();
-    let most = policy.actions().len();
     let index = |(row, value): (usize, &f64)| {
         if value.fract() == 0.0 && *value >= 0.0 && *value < most as f64 {
             return *value as u32;
         }
-        if let Some(column) = located.signal("action") {
+        if let Some(column) = located.signal(name) {
             let message = Message::new("an action that the contract does not have").found(value.to_string());
             let last = most.saturating_sub(1);
             faults.push(column.fault(sheet, row, message.expected(format!("an index from 0 to {last}"))));

@@ -14,6 +14,7 @@ mod duties;
 mod explain;
 mod integral;
 mod itself;
+mod late;
 mod log;
 mod sources;
 mod text;
@@ -21,7 +22,7 @@ mod values;
 mod variants;
 
 use interp::{Controller, Real, Trace};
-use policy::{Input, Policy, Scalar};
+use policy::{DutyPath, Policy, Scalar};
 use serde::Serialize;
 use toml_input::{Faults, Message};
 
@@ -29,8 +30,9 @@ pub use duties::DutyResult;
 pub use log::Log;
 pub use text::text;
 
-use explain::Course;
-use log::Applied;
+use duties::Logged;
+use explain::{Course, OutputCourse};
+use log::Done;
 use values::{allowed, ends};
 
 /// What differs less than this share of the largest logged magnitude is equal.
@@ -50,6 +52,12 @@ pub struct Replay {
     pub actions: Option<ActionResult>,
     /// The duties that the log has with its actions beside those of the contract; `None` if it has none.
     pub duties: Option<DutyResult>,
+    /// The same of each of several outputs, in the order of the contract, and nothing of it above; empty where there is one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub outputs: Vec<OutputResult>,
+    /// The column that is logged one row below the others, if that is all that differs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub late: Option<String>,
     /// Signals with samples outside their plausible range: name, rows, smallest and largest logged value. They were taken as they
     /// are; the controller will hold the last good sample.
     pub outside: Vec<(String, usize, [f64; 2])>,
@@ -57,6 +65,39 @@ pub struct Replay {
     pub tolerance: f64,
     /// What a reader of the log should know.
     pub notes: Vec<String>,
+}
+
+/// One of several outputs beside the log.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OutputResult {
+    /// Its name in the contract.
+    pub name: String,
+    /// As [`Replay::actions`].
+    pub actions: Option<ActionResult>,
+    /// As [`Replay::duties`].
+    pub duties: Option<DutyResult>,
+}
+
+/// What was found of an output, of one or of several.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Commanded<'a> {
+    /// Its name; `None` where there is one.
+    pub name: Option<&'a str>,
+    pub actions: Option<&'a ActionResult>,
+    pub duties: Option<&'a DutyResult>,
+}
+
+impl Commanded<'_> {
+    /// Whether the log's choice or duty is another.
+    pub fn differs(&self) -> bool {
+        self.actions
+            .is_some_and(|actions| !actions.exploring && actions.first_line.is_some())
+    }
+
+    /// Whether its actions have other duties.
+    pub fn has_other_duties(&self) -> bool {
+        self.duties.is_some_and(|duties| duties.first_line.is_some())
+    }
 }
 
 /// A feature of the contract beside the log's.
@@ -104,9 +145,24 @@ impl Replay {
     /// Nothing that the log has is other than the contract says.
     #[must_use]
     pub fn equal(&self) -> bool {
-        let actions = (self.actions.as_ref()).is_none_or(|actions| actions.exploring || actions.first_line.is_none());
-        let duties = self.duties.as_ref().is_none_or(|duties| duties.first_line.is_none());
-        actions && duties && self.compared().all(|(_, compared)| compared.first_line.is_none())
+        let other = |output: &Commanded<'_>| output.differs() || output.has_other_duties();
+        !self.commands().iter().any(other) && self.compared().all(|(_, compared)| compared.first_line.is_none())
+    }
+
+    /// Of each output, in the order of the contract.
+    pub(crate) fn commands(&self) -> Vec<Commanded<'_>> {
+        if self.outputs.is_empty() {
+            let (actions, duties) = (self.actions.as_ref(), self.duties.as_ref());
+            let name = None;
+            return vec![Commanded { name, actions, duties }];
+        }
+        (self.outputs.iter())
+            .map(|output| Commanded {
+                name: Some(&output.name),
+                actions: output.actions.as_ref(),
+                duties: output.duties.as_ref(),
+            })
+            .collect()
     }
 
     /// The features that the log has.
@@ -136,6 +192,13 @@ pub struct Wanted {
 /// # Errors
 /// A duty in the log that no action of the contract commands.
 pub fn replay(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faults> {
+    let mut replay = compared(policy, log, wanted)?;
+    replay.late = late::column(policy, log, wanted, &replay);
+    Ok(replay)
+}
+
+/// The same without a search for a column that is late.
+fn compared(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faults> {
     let Wanted { tolerance, .. } = wanted;
     let late = log.is_late(wanted.skip);
     // the environment held no sample: what the features are does not depend on what a sensor can show
@@ -144,7 +207,18 @@ pub fn replay(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faul
         Scalar::F32 => course::<f32>(wide, log)?,
         Scalar::F64 => course::<f64>(wide, log)?,
     };
-    let duties = duties::duties(policy, log, &course.commanded);
+    let paths = policy.paths();
+    let outputs = paths.iter().zip(&log.done).zip(&course.outputs);
+    let results = outputs.map(|((path, done), own)| {
+        let of = Logged {
+            policy,
+            path,
+            log,
+            done,
+        };
+        (commands(of, own, wanted), duties::duties(of, &own.commanded))
+    });
+    let results: Vec<(Option<ActionResult>, Option<DutyResult>)> = results.collect();
     let features = policy.features.iter().enumerate().map(|(index, feature)| {
         let own = course.observation(index);
         let logged = log.observed.get(index).and_then(Option::as_ref);
@@ -156,8 +230,10 @@ pub fn replay(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faul
                 if compared.first_line.is_some() {
                     let is_other =
                         |duties: &&DutyResult| duties.first_line.is_some() && (duties.adds || !duties.derived);
-                    let follows = duties.as_ref().filter(is_other);
-                    compared.explanation = match follows.filter(|_| feature.source.reads(Input::PreviousDuty)) {
+                    let read = |(path, _): &(&DutyPath<'_>, _)| feature.source.reads(path.previous_duty);
+                    let read = paths.iter().zip(&results).filter(read);
+                    let mut follows = read.filter_map(|(_, (_, duties))| duties.as_ref().filter(is_other));
+                    compared.explanation = match follows.next() {
                         // a line through two tables of duties would hide it in scale and offset
                         Some(duties) if duties.derived => Some(
                             "it follows the duties of the actions, which are others, or its own scale and offset are"
@@ -171,29 +247,45 @@ pub fn replay(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faul
             }),
         }
     });
+    let features = features.collect();
+    let (mut one, mut several) = ((None, None), Vec::new());
+    for (path, (actions, duties)) in paths.iter().zip(results) {
+        match path.name.map(str::to_owned) {
+            None => one = (actions, duties),
+            Some(name) => several.push(OutputResult { name, actions, duties }),
+        }
+    }
     Ok(Replay {
         rows: log.rows(),
         episodes: log.begins.iter().filter(|begins| **begins).count(),
-        features: features.collect(),
-        actions: commands(policy, log, &course, wanted),
-        duties,
+        features,
+        actions: one.0,
+        duties: one.1,
+        outputs: several,
+        late: None,
         outside: log.outside(policy),
         tolerance,
         notes: log.notes.clone(),
     })
 }
 
-/// The choices of a log, or the duties of a continuous actor in it; `None` if it has neither.
-fn commands(policy: &Policy, log: &Log, course: &Course, wanted: Wanted) -> Option<ActionResult> {
+/// The choices of a log for an output, or the duties of a continuous actor in it; `None` if it has neither.
+fn commands(of: Logged<'_>, course: &OutputCourse, wanted: Wanted) -> Option<ActionResult> {
     let Wanted {
         tolerance,
         exploring,
         skip,
     } = wanted;
+    let Logged {
+        policy,
+        path,
+        log,
+        done,
+    } = of;
     let late = log.is_late(skip);
     let is_late = |row: &usize| late.get(*row).copied().unwrap_or(true);
     let mut ties = 0;
-    let others: Vec<usize> = match (&log.actions, policy.head.duty_span().zip(log.commanded.as_ref())) {
+    let others: Vec<usize> = match (&done.actions, path.head.duty_span().zip(done.commanded())) {
         (Some(logged), _) => {
             let other = |row: &usize| logged.get(*row) != course.actions.get(*row);
             let others = (0..log.rows()).filter(is_late).filter(other);
@@ -258,51 +350,68 @@ fn course<T: Real>(policy: &Policy, log: &Log) -> Result<Course, Faults> {
     let mut controller = Controller::<T>::new(policy);
     let mut trace = controller.blank_trace();
     let mut course = Course::new(policy, &log.begins);
-    let before = duties::before(policy, log);
+    let paths = policy.paths();
+    let of = |(path, done)| Logged {
+        policy,
+        path,
+        log,
+        done,
+    };
+    let before: Vec<Vec<Option<f64>>> = paths.iter().zip(&log.done).map(of).map(duties::before).collect();
     for (row, samples) in log.samples.iter().enumerate() {
         if log.begins.get(row).copied().unwrap_or(row == 0) {
             controller.reset();
         }
-        if let Some(duty) = before.get(row).copied().flatten() {
-            let mut state = controller.state().clone();
-            state.previous_duty = T::nearest(duty);
-            controller.restore(&state);
+        let mut state = controller.state().clone();
+        for (output, before) in before.iter().enumerate() {
+            if let Some(duty) = before.get(row).copied().flatten() {
+                let mut own = state.output(output);
+                own.previous_duty = T::nearest(duty);
+                state.set_output(output, own);
+            }
         }
+        controller.restore(&state);
         controller.eval_into(samples, &mut trace)?;
         if !trace.sound {
-            let message = Message::new("the duty before this row is none that the contract's actions command");
-            let message = message
-                .found(controller.state().previous_duty.to_f64().to_string())
-                .expected(
-                    "one between the smallest and the largest of [actions] duties, initial_duty and the fallback's",
-                );
-            return Err(log.fault(row, message).into());
+            return Err(log.fault(row, no_duty(&controller)).into());
         }
         course.push(&trace);
-        if let Some(action) = log.actions.as_ref().and_then(|actions| actions.get(row)) {
-            course.gives_up(&trace, *action);
+        let q: Vec<f64> = trace.q_values.iter().map(|q| q.to_f64()).collect();
+        for (output, (path, done)) in paths.iter().zip(&log.done).enumerate() {
+            let logged = done.actions.as_ref().and_then(|actions| actions.get(row));
+            if let (Some(logged), Some(own)) = (logged, course.outputs.get_mut(output)) {
+                let q = q.get(path.columns()).unwrap_or_default();
+                own.gives_up(q, [trace.decision(output).action_index, *logged]);
+            }
         }
-        apply(&controller, &mut trace, &log.applied, row);
+        for (output, done) in log.done.iter().enumerate() {
+            apply(&controller, &mut trace, (output, done), row);
+        }
         course.commanded(&trace);
         controller.commit_trace(&trace);
     }
     Ok(course)
 }
 
-/// Puts what the trainer applied in the place of the controller's own command.
-fn apply<T: Real>(controller: &Controller<T>, trace: &mut Trace<T>, applied: &Applied, row: usize) {
-    match applied {
-        Applied::Own => {}
-        Applied::Actions(actions) => {
-            if let Some(action) = actions.get(row) {
-                controller.choose(trace, *action);
-            }
+fn no_duty<T: Real>(controller: &Controller<T>) -> Message {
+    let state = controller.state();
+    let before = (0..state.outputs()).map(|output| state.output(output).previous_duty.to_f64().to_string());
+    let before: Vec<String> = before.collect();
+    Message::new("the duty before this row is none that the contract's actions command")
+        .found(before.join(", "))
+        .expected("one between the smallest and the largest of [actions] duties, initial_duty and the fallback's")
+}
+
+/// Puts what the trainer applied to an output in the place of the controller's own command.
+fn apply<T: Real>(controller: &Controller<T>, trace: &mut Trace<T>, (output, done): (usize, &Done), row: usize) {
+    if let Some(actions) = &done.actions {
+        if let Some(action) = actions.get(row) {
+            controller.choose_of(trace, output, *action);
         }
-        Applied::Duties(duties) => {
-            if let Some(duty) = duties.get(row) {
-                trace.command.duty_sim = T::nearest(*duty);
-                trace.command.duty = trace.command.duty_sim;
-            }
-        }
+    } else if let Some(duty) = done.duty.as_ref().and_then(|duties| duties.get(row)) {
+        let mut decision = trace.decision(output);
+        decision.command.duty_sim = T::nearest(*duty);
+        decision.command.duty = decision.command.duty_sim;
+        trace.set_decision(output, decision);
     }
 }

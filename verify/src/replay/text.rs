@@ -1,10 +1,10 @@
 //! A replay in words.
 
-use policy::{Feature, Filter, Policy};
+use policy::{DutyPath, Feature, Filter, Policy};
 use report::grouped;
 
 use super::explain::number;
-use super::{Compared, FeatureResult, Replay};
+use super::{Commanded, Compared, FeatureResult, Replay};
 
 /// The table of features, what differs, and the verdict.
 #[must_use]
@@ -32,7 +32,6 @@ pub fn text(policy: &Policy, replay: &Replay) -> String {
     for feature in &replay.features {
         out += &row(feature, rows, width);
     }
-    let is_continuous = !policy.head.is_choice();
     let words = words(policy, replay);
     if !words.is_empty() {
         out.push('\n');
@@ -41,7 +40,7 @@ pub fn text(policy: &Policy, replay: &Replay) -> String {
         out += &format!("  {line}\n");
     }
     out.push('\n');
-    out += &verdict(replay, is_continuous);
+    out += &verdict(policy, replay);
     out.push('\n');
     out
 }
@@ -64,7 +63,11 @@ fn range([low, high]: [f64; 2]) -> String {
 
 /// What is to be said below the table.
 fn words(policy: &Policy, replay: &Replay) -> Vec<String> {
-    let is_continuous = !policy.head.is_choice();
+    if let Some(late) = &replay.late {
+        return vec![format!(
+            "{late}: logged one row late; with each of its values a row earlier, all that the log has is equal"
+        )];
+    }
     let mut words = Vec::new();
     for (feature, compared) in replay.compared() {
         let name = &feature.name;
@@ -81,28 +84,9 @@ fn words(policy: &Policy, replay: &Replay) -> Vec<String> {
         }
     }
     words.extend(unreached_words(policy, replay));
-    if let Some(actions) = &replay.actions {
-        let (equal, rows) = (grouped(actions.equal as u64), grouped(replay.rows as u64));
-        let told = match (actions.first_line, actions.exploring) {
-            (None, _) => String::new(),
-            (Some(line), true) => format!(", first other in line {line}: explored"),
-            (Some(line), false) => format!(", first other in line {line}"),
-        };
-        let command = if is_continuous { "duty" } else { "action" };
-        let ties = match actions.ties {
-            0 => String::new(),
-            1 => ", 1 tie apart".to_owned(),
-            ties => format!(", {} ties apart", grouped(ties as u64)),
-        };
-        words.push(format!("{command} equal in {equal} of {rows}{ties}{told}"));
-        if actions.ties > 0 {
-            words.push(format!(
-                "a tie: both actions have the same Q value within golden_tolerance, {} of the largest; a rounding chose between them",
-                number(policy.golden_tolerance())
-            ));
-        }
+    for (output, path) in replay.commands().into_iter().zip(policy.paths()) {
+        words.extend(command_words(policy, replay, output, &path));
     }
-    words.extend(replay.duties.as_ref().and_then(super::DutyResult::text));
     for (signal, rows, [low, high]) in &replay.outside {
         words.push(format!(
             "{signal}: {} to {} in the log, outside its range in {}: there the controller will hold the last good sample, and then \
@@ -112,6 +96,36 @@ fn words(policy: &Policy, replay: &Replay) -> Vec<String> {
             counted(*rows, "row")
         ));
     }
+    words
+}
+
+/// What is to be said of the choices or duties of an output.
+fn command_words(policy: &Policy, replay: &Replay, output: Commanded<'_>, path: &DutyPath<'_>) -> Vec<String> {
+    let of = output.name.map_or(String::new(), |name| format!("{name}: "));
+    let mut words = Vec::new();
+    if let Some(actions) = output.actions {
+        let (equal, rows) = (grouped(actions.equal as u64), grouped(replay.rows as u64));
+        let told = match (actions.first_line, actions.exploring) {
+            (None, _) => String::new(),
+            (Some(line), true) => format!(", first other in line {line}: explored"),
+            (Some(line), false) => format!(", first other in line {line}"),
+        };
+        let command = if path.head.is_choice() { "action" } else { "duty" };
+        let ties = match actions.ties {
+            0 => String::new(),
+            1 => ", 1 tie apart".to_owned(),
+            ties => format!(", {} ties apart", grouped(ties as u64)),
+        };
+        words.push(format!("{of}{command} equal in {equal} of {rows}{ties}{told}"));
+        if actions.ties > 0 {
+            words.push(format!(
+                "a tie: both actions have the same Q value within golden_tolerance, {} of the largest; a rounding chose between them",
+                number(policy.golden_tolerance())
+            ));
+        }
+    }
+    let others = output.duties.and_then(super::DutyResult::text);
+    words.extend(others.map(|text| format!("{of}{text}")));
     words
 }
 
@@ -213,42 +227,20 @@ fn is_still(compared: &Compared) -> bool {
     low == high
 }
 
-fn verdict(replay: &Replay, is_continuous: bool) -> String {
+fn verdict(policy: &Policy, replay: &Replay) -> String {
     let compared = replay.compared().count();
     let of = replay.features.len();
-    if !replay.equal() {
-        let others = replay
-            .compared()
-            .filter(|(_, compared)| compared.first_line.is_some())
-            .count();
-        let other_duties = (replay.duties.as_ref()).is_some_and(|duties| duties.first_line.is_some());
-        return match others {
-            0 if other_duties => "DIFFERENT: the actions of the log have other duties".to_owned(),
-            0 if compared == 0 => format!(
-                "DIFFERENT: the {}. The log has no observations, which would say why: {} all show here. Columns `obs_0`, `obs_1`, ... \
-                 tell them apart. A trainer who explores: --exploring",
-                if is_continuous { "duties" } else { "actions" },
-                if is_continuous {
-                    "a filter that begins otherwise, the scale of a feature, squash or clip, scale and offset in [actions], base and factors of a law"
-                } else {
-                    "a filter that begins otherwise, the scale of a feature, the order of the features or of [actions]"
-                }
-            ),
-            0 if compared < of => unlogged(replay, is_continuous),
-            0 if is_continuous => "DIFFERENT: the observations are equal, the duties are not. A trainer who explores: --exploring. Otherwise look \
-                  at squash or clip, scale and offset in [actions], and at the golden vectors"
-                .to_owned(),
-            0 => "DIFFERENT: the observations are equal, the actions are not. A trainer who explores: --exploring. Otherwise look at \
-                  the order of [actions], and at the golden vectors"
-                .to_owned(),
-            1 => format!("DIFFERENT: 1 of {compared} logged features"),
-            others => format!("DIFFERENT: {others} of {compared} logged features"),
-        };
+    if let Some(late) = &replay.late {
+        return format!("DIFFERENT: `{late}` is logged one row late, and nothing else differs");
     }
-    match (compared, &replay.actions) {
-        (0, None) => "NOTHING COMPARED: the log has no observations and no actions".to_owned(),
-        (0, Some(_)) if is_continuous => "equal: the duties (the log has no observations)".to_owned(),
-        (0, Some(_)) => "equal: the actions (the log has no observations)".to_owned(),
+    let kind = Kind::of(policy, replay);
+    if !replay.equal() {
+        return different(replay, &kind);
+    }
+    let has_commands = replay.commands().iter().any(|output| output.actions.is_some());
+    match (compared, has_commands) {
+        (0, false) => "NOTHING COMPARED: the log has no observations and no actions".to_owned(),
+        (0, true) => format!("equal: the {} (the log has no observations)", kind.noun),
         (compared, _) if compared < of => format!("equal: the {compared} of {of} features that the log has"),
         _ => format!(
             "equal: all {} within {} of their largest value",
@@ -258,8 +250,75 @@ fn verdict(replay: &Replay, is_continuous: bool) -> String {
     }
 }
 
+/// What stands behind the network: of several outputs, of those that differ.
+struct Kind {
+    /// `actions`, `duties`, or both with the names of outputs.
+    noun: String,
+    /// Whether a number is commanded, and no choice made.
+    is_continuous: bool,
+}
+
+impl Kind {
+    fn of(policy: &Policy, replay: &Replay) -> Self {
+        let paths = policy.paths();
+        let both: Vec<_> = replay.commands().into_iter().zip(&paths).collect();
+        let differ: Vec<_> = both.iter().filter(|(output, _)| output.differs()).collect();
+        // where none differs, all of them are meant
+        let meant = if differ.is_empty() {
+            both.iter().collect()
+        } else {
+            differ
+        };
+        let noun = |path: &DutyPath<'_>| if path.head.is_choice() { "actions" } else { "duties" };
+        let named = meant.iter().map(|(output, path)| match output.name {
+            Some(name) => format!("{} of {name}", noun(path)),
+            None => noun(path).to_owned(),
+        });
+        let list: Vec<String> = named.collect();
+        Self {
+            noun: list.join(" and the "),
+            is_continuous: meant.first().is_some_and(|(_, path)| !path.head.is_choice()),
+        }
+    }
+}
+
+fn different(replay: &Replay, kind: &Kind) -> String {
+    let (noun, is_continuous) = (&kind.noun, kind.is_continuous);
+    let compared = replay.compared().count();
+    let others = replay.compared().filter(|(_, compared)| compared.first_line.is_some());
+    let others = others.count();
+    let outputs = replay.commands();
+    let other_duties: Vec<_> = outputs.iter().filter(|output| output.has_other_duties()).collect();
+    if let ([first, ..], 0) = (other_duties.as_slice(), others) {
+        let of = first.name.map_or(String::new(), |name| format!(" of {name}"));
+        return format!("DIFFERENT: the actions{of} of the log have other duties");
+    }
+    match others {
+        0 if compared == 0 => format!(
+            "DIFFERENT: the {noun}. The log has no observations, which would say why: {} all show here. Columns `obs_0`, `obs_1`, ... \
+             tell them apart. A trainer who explores: --exploring",
+            if is_continuous {
+                "a filter that begins otherwise, the scale of a feature, squash or clip, scale and offset in [actions], base and factors of a law"
+            } else {
+                "a filter that begins otherwise, the scale of a feature, the order of the features or of [actions]"
+            }
+        ),
+        0 if compared < replay.features.len() => unlogged(replay, noun),
+        0 => format!(
+            "DIFFERENT: the observations are equal, the {noun} are not. A trainer who explores: --exploring. Otherwise look at {}, \
+             and at the golden vectors",
+            match is_continuous {
+                true => "squash or clip, scale and offset in [actions]",
+                false => "the order of [actions]",
+            }
+        ),
+        1 => format!("DIFFERENT: 1 of {compared} logged features"),
+        others => format!("DIFFERENT: {others} of {compared} logged features"),
+    }
+}
+
 /// Other commands of equal observations, of which some are not in the log.
-fn unlogged(replay: &Replay, is_continuous: bool) -> String {
+fn unlogged(replay: &Replay, noun: &str) -> String {
     let missing = replay.features.iter().filter(|feature| feature.logged.is_none());
     let missing: Vec<String> = missing.map(|feature| format!("`{}`", feature.name)).collect();
     let (list, verb) = match missing.as_slice() {
@@ -271,9 +330,8 @@ fn unlogged(replay: &Replay, is_continuous: bool) -> String {
         1 => "the 1 logged observation is equal".to_owned(),
         count => format!("the {count} logged observations are equal"),
     };
-    let commands = if is_continuous { "duties" } else { "actions" };
     format!(
-        "DIFFERENT: {seen}, the {commands} are not; {list} {verb} not in the log: look there first. A trainer who explores: --exploring"
+        "DIFFERENT: {seen}, the {noun} are not; {list} {verb} not in the log: look there first. A trainer who explores: --exploring"
     )
 }
 

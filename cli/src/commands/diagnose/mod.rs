@@ -244,17 +244,24 @@ impl Shown {
 
 /// The policy and what is asked of it; nothing of one without a mapping that is there to be trained anew.
 fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Option<Request>, Failure> {
-    let policy = super::load(path, options.outside)?;
+    // a training has one duty, and so has the policy that it is compared with
+    let policy = match options.retrain {
+        Some(_) => super::load(path, options.outside)?,
+        None => super::load_several_as(path, options.outside, None)?,
+    };
     let is_buck = model.converter.topology == Topology::Buck;
     if options.retrain.is_some() && (policy.mapping.is_none() || !is_buck) {
         return Ok(None);
     }
-    super::drm::needs_mapping(&policy)?;
     let (trained_on, file) = match &options.trained_on {
         Some(path) => (Parameters::buck_from_file(path, "`diagnose --policy`")?, path),
         None => (model.clone(), &options.model),
     };
     let scenario = options.scenario.as_deref().map(Scenario::load).transpose()?;
+    let named = options.output.as_deref();
+    let named = named.or(scenario.as_ref().and_then(|scenario| scenario.output.as_deref()));
+    let output = closed_loop::driving(named, &policy, options.scenario.as_deref().unwrap_or(path))?;
+    super::drm::needs_mapping(&policy, output)?;
     let given = scenario.as_ref().and_then(|scenario| scenario.v_ref);
     let v_ref = simulate::v_ref(given, &policy, options.scenario.as_ref().unwrap_or(&options.model))?;
     for (converter, file) in [(&trained_on, file), (model, &options.model)] {
@@ -263,6 +270,7 @@ fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Option
     Ok(Some(Request {
         losses: Losses::of(&trained_on)?,
         policy,
+        output,
         trained_on,
         v_ref,
         load_steps: scenario

@@ -22,8 +22,11 @@ use crate::talk;
 /// Transfers, writes, reports.
 pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
     output::check_new_folder(&options.out)?;
-    let scenario = Scenario::load(&options.scenario)?;
-    let policy = crate::commands::load(&options.policy, options.outside)?;
+    let mut scenario = Scenario::load(&options.scenario)?;
+    if options.output.is_some() {
+        scenario.output.clone_from(&options.output);
+    }
+    let policy = crate::commands::load_several_as(&options.policy, options.outside, None)?;
     let setting = Setting::new(&options.scenario, scenario, policy)?;
     let stop = interruption::stop_on_signal();
     let found = match options.simulator {
@@ -70,10 +73,11 @@ fn at<E: Environment>(
     simulate: &dyn Fn(&Path, &Parameters) -> Result<E, Error>,
 ) -> Result<Findings, Failure> {
     let mut line = ProgressLine::new();
+    let output = setting.output;
     let means = Means {
         simulator,
         simulate,
-        start: &|policy| controllers::start(policy, options.controller),
+        start: &|policy| controllers::start(policy, output, options.controller),
         ideal: options.ideal,
         tell: &mut |what| line.next(what),
     };

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
-use tests::shards::{self, Plan, Row};
+use tests::shards::{self, Family, Plan, Row};
 use toml_input::Faults;
 use verify::shards::Shard;
 
@@ -29,6 +29,9 @@ struct Arguments {
     /// Folder of the results
     #[arg(long)]
     out: PathBuf,
+    /// Policies with several outputs, from seeds of their own, in the place of those with one
+    #[arg(long)]
+    several: bool,
     /// Only merge the shards in the folder, and print their table
     #[arg(long)]
     merge: bool,
@@ -47,20 +50,30 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<Vec<Row>, Faults> {
     if !arguments.merge {
+        let family = match arguments.several {
+            true => Family::Several,
+            false => Family::One,
+        };
         let plan = Plan {
             first: arguments.first,
             policies: arguments.policies,
             steps: arguments.steps,
             shard: arguments.shard,
+            family,
         };
         let started = Instant::now();
         let mut compared = 0;
-        shards::run(plan, &arguments.out, shards::compare, |row| {
-            compared += 1;
-            if !row.is_equal() || compared % 25 == 0 {
-                println!("{:.0} s, {compared} compared: {row}", started.elapsed().as_secs_f64());
-            }
-        })?;
+        shards::run(
+            plan,
+            &arguments.out,
+            |seed, steps| shards::compare(family, seed, steps),
+            |row| {
+                compared += 1;
+                if !row.is_equal() || compared % 25 == 0 {
+                    println!("{:.0} s, {compared} compared: {row}", started.elapsed().as_secs_f64());
+                }
+            },
+        )?;
     }
     let rows = shards::merge(&arguments.out)?;
     print!("{}", shards::table(&rows));

@@ -7,7 +7,7 @@ use policy::Activation;
 use random::{Random, SplitMix};
 use safetensors::SafeTensorError;
 
-use crate::random::{Folder, action_table, continuous, estimate, feature, observer, source, weights};
+use super::{Folder, action_table, continuous, estimate, feature, observer, source, weights};
 
 /// Names of the outputs, as many as are drawn.
 const NAMES: [&str; 4] = ["left", "right", "mid", "spare"];

@@ -56,7 +56,6 @@ fn an_output_that_passes_on_one_duty_refuses_several_by_name() {
         Output::Sfunction,
         Output::Fmu2,
         Output::Fmu3,
-        Output::Kit,
         Output::RustOverC,
     ] {
         let refused = codegen::sources(&policy, host, &[output], None).expect_err(output.name());

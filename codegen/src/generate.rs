@@ -113,7 +113,12 @@ fn check_types(policy: &Policy, target: &TargetSpec) -> Result<(), CodegenError>
 
 /// What passes on one duty is refused for several: the first of them would look like the only one.
 fn check_duties(policy: &Policy, outputs: &[Output]) -> Result<(), CodegenError> {
-    let takes_several = |output: &&Output| matches!(output, Output::C | Output::Rust | Output::Kit);
+    let takes_several = |output: &&Output| {
+        matches!(
+            output,
+            Output::C | Output::Rust | Output::Kit | Output::Sfunction | Output::Fmu2 | Output::Fmu3
+        )
+    };
     match outputs.iter().find(|output| !takes_several(output)) {
         Some(output) if matches!(policy.head, policy::Head::Several(_)) => Err(CodegenError::OneDuty {
             output: output.name(),

@@ -52,12 +52,7 @@ fn an_output_that_passes_on_one_duty_refuses_several_by_name() {
     use codegen::Output;
     let (_folder, policy) = load(0);
     let host = targets::find("host").unwrap();
-    for output in [
-        Output::Sfunction,
-        Output::Fmu2,
-        Output::Fmu3,
-        Output::RustOverC,
-    ] {
+    for output in [Output::RustOverC] {
         let refused = codegen::sources(&policy, host, &[output], None).expect_err(output.name());
         let text = toml_input::Faults::from(refused).to_string();
         for part in [output.name(), "passes on one duty", "left, right", "--output N"] {

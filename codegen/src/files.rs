@@ -36,13 +36,6 @@ pub enum CodegenError {
         /// Name of the target.
         target: &'static str,
     },
-    /// The output passes on one duty, and the policy has several.
-    OneDuty {
-        /// Name of the output.
-        output: &'static str,
-        /// Names of the duties.
-        duties: Vec<String>,
-    },
     /// The processor lacks a type that the numeric format stores.
     NoType {
         /// The format.
@@ -60,7 +53,6 @@ impl fmt::Display for CodegenError {
             CodegenError::Manifest(message) => write!(f, "internal fault: manifest: {message}"),
             CodegenError::Output(message) => write!(f, "internal fault: output: {message}"),
             CodegenError::Flushed { .. } => f.write_str("the processor would take a constant of the policy for zero"),
-            CodegenError::OneDuty { output, .. } => write!(f, "the output `{output}` passes on one duty"),
             CodegenError::NoType { .. } => f.write_str("the processor has no type for the numeric format"),
         }
     }
@@ -73,13 +65,6 @@ impl From<CodegenError> for Faults {
         let message = Message::new(error.to_string());
         let (format, target) = match error {
             CodegenError::NoType { format, target } => (format, target),
-            CodegenError::OneDuty { duties, .. } => {
-                return message
-                    .found(format!("a contract with the outputs {}", duties.join(", ")))
-                    .expected("c or rust, which have all of them")
-                    .hint("`policyc new MODEL --output N` writes a contract for one of them")
-                    .into();
-            }
             CodegenError::Flushed { place, value, target } => {
                 return message
                     .found(format!(

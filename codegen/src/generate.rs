@@ -40,7 +40,6 @@ pub fn sources(
     expected: Option<&Material>,
 ) -> Result<GeneratedFiles, CodegenError> {
     check_types(policy, target)?;
-    check_duties(policy, outputs)?;
     let outputs = output::with_cores(outputs);
     let mut all = GeneratedFiles::default();
     for language in output::languages(&outputs) {
@@ -109,18 +108,6 @@ fn check_types(policy: &Policy, target: &TargetSpec) -> Result<(), CodegenError>
         });
     }
     Ok(())
-}
-
-/// What passes on one duty is refused for several: the first of them would look like the only one.
-fn check_duties(policy: &Policy, outputs: &[Output]) -> Result<(), CodegenError> {
-    let takes_several = |output: &&Output| matches!(output, Output::C | Output::Rust);
-    match outputs.iter().find(|output| !takes_several(output)) {
-        Some(output) if matches!(policy.head, policy::Head::Several(_)) => Err(CodegenError::OneDuty {
-            output: output.name(),
-            duties: policy.output_names().into_iter().map(str::to_owned).collect(),
-        }),
-        _ => Ok(()),
-    }
 }
 
 /// The files of one output, from the program in its language.

@@ -224,14 +224,24 @@ fn stand_in(type_name: &Ident, faults: &Faults, fields: &TokenStream) -> TokenSt
         let (name, number) = (Ident::new(bit.name, Span::call_site()), bit.number);
         quote!(pub const #name: u32 = 1 << #number;)
     });
+    let (duty, index) = match faults.skeleton.outputs.is_empty() {
+        true => (quote!(f32), quote!(u32)),
+        false => (quote!([f32; OUTPUTS]), quote!([u32; OUTPUTS])),
+    };
+    let (no_duty, no_index) = match faults.skeleton.outputs.is_empty() {
+        true => (quote!(0.0), quote!(0)),
+        false => (quote!([0.0; OUTPUTS]), quote!([0; OUTPUTS])),
+    };
+    let places = places(&faults.skeleton.outputs);
     quote! {
         #(pub const #counts: usize = #lengths;)*
+        #places
         pub const SAMPLE_PERIOD: f64 = 1.0;
         pub mod status { #(#bits)* }
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct Measurement { #fields }
         #[derive(Debug, Clone, Copy, PartialEq)]
-        pub struct Command { pub duty: f32, pub duty_sim: f32, pub action_index: u32, pub status: u32 }
+        pub struct Command { pub duty: #duty, pub duty_sim: #duty, pub action_index: #index, pub status: u32 }
         #[derive(Clone, Default)]
         pub struct #type_name;
         impl #type_name {
@@ -245,7 +255,24 @@ fn stand_in(type_name: &Ident, faults: &Faults, fields: &TokenStream) -> TokenSt
             pub fn state_words(&self) -> [u32; STATE_WORDS] { [0; STATE_WORDS] }
             pub fn self_test() -> Result<(), u32> { Err(0) }
             pub fn integrity() -> bool { false }
-            const NOTHING: Command = Command { duty: 0.0, duty_sim: 0.0, action_index: 0, status: 0 };
+            const NOTHING: Command = Command { duty: #no_duty, duty_sim: #no_duty, action_index: #no_index, status: 0 };
         }
+    }
+}
+
+/// The number of several duties and the place of each whose name is known; nothing where there is one.
+fn places(outputs: &[Option<String>]) -> TokenStream {
+    if outputs.is_empty() {
+        return TokenStream::new();
+    }
+    let each = outputs.iter().enumerate().filter_map(|(index, name)| {
+        let name = name.as_ref()?.to_uppercase();
+        let constant = Ident::new(&format!("OUTPUT_{name}"), Span::call_site());
+        Some(quote!(pub const #constant: usize = #index;))
+    });
+    let count = outputs.len();
+    quote! {
+        pub const OUTPUTS: usize = #count;
+        #(#each)*
     }
 }

@@ -31,6 +31,8 @@ pub struct Skeleton {
     pub features: Option<usize>,
     /// How many outputs the network has by the actions that it lists.
     pub actions: Option<usize>,
+    /// Each of several outputs, with its name if that is fit and no other has it; none where there is one.
+    pub outputs: Vec<Option<String>>,
 }
 
 impl Faults {
@@ -39,6 +41,7 @@ impl Faults {
     pub fn refusing(policy: &Policy, message: Message) -> Self {
         let contract = policy.files.first().map(PathBuf::as_path);
         let signal = |signal: &Signal| (signal.name.clone(), signal.adc.is_some());
+        let names = policy.output_names();
         Faults {
             faults: contract.map_or_else(
                 || message.clone().into(),
@@ -50,6 +53,7 @@ impl Faults {
                 signals: policy.signals.iter().map(signal).collect(),
                 features: Some(policy.features.len()),
                 actions: Some(policy.outputs()),
+                outputs: names.into_iter().map(|name| Some(name.to_owned())).collect(),
             }),
         }
     }

@@ -256,14 +256,32 @@ fn skeleton(contract: &Document) -> Skeleton {
             signals.push((name, item.peek("adc").is_some()));
         }
     }
-    let count = |keys: &[&str]| Some(contract.peek(keys)?.as_list()?.len());
+    let list = contract.peek(&["output"]).and_then(|value| value.as_list());
+    let list = list.unwrap_or_default();
+    let mut outputs: Vec<Option<String>> = Vec::new();
+    for item in &list {
+        let name = fit(item.peek("name"), Kind::Output);
+        outputs.push(name.filter(|name| outputs.iter().flatten().all(|known| known != name)));
+    }
+    let columns = |table: Value<'_>| {
+        let count = |key: &str| Some(table.peek(key)?.as_list()?.len());
+        match table.peek("continuous") {
+            Some(_) => Some(1),
+            None => count("duties").or_else(|| count("offsets")),
+        }
+    };
+    let own = list.iter().map(|item| columns(item.peek("actions")?)).sum();
     Skeleton {
         name,
         signals,
-        features: count(&["feature"]),
-        actions: match contract.peek(&["actions", "continuous"]) {
-            Some(_) => Some(1),
-            None => count(&["actions", "duties"]).or_else(|| count(&["actions", "offsets"])),
+        features: contract
+            .peek(&["feature"])
+            .and_then(|value| value.as_list())
+            .map(|list| list.len()),
+        actions: match outputs.is_empty() {
+            true => contract.peek(&["actions"]).and_then(columns),
+            false => own,
         },
+        outputs,
     }
 }

@@ -52,26 +52,6 @@ fn random_policies_with_several_outputs_reach_heads_limiters_observers_and_two_t
     }
 }
 
-#[test]
-fn an_output_that_passes_on_one_duty_refuses_several_by_name() {
-    use codegen::Output;
-    let (_folder, policy) = load(0);
-    let host = targets::find("host").unwrap();
-    for output in [
-        Output::Sfunction,
-        Output::Fmu2,
-        Output::Fmu3,
-        Output::Kit,
-        Output::RustOverC,
-    ] {
-        let refused = codegen::sources(&policy, host, &[output], None).expect_err(output.name());
-        let text = toml_input::Faults::from(refused).to_string();
-        for part in [output.name(), "passes on one duty", "left, right", "--output N"] {
-            assert!(text.contains(part), "{part}: {text}");
-        }
-    }
-}
-
 /// Each of these would be silently wrong in a duty that is not the first.
 #[test]
 fn planted_defects_in_the_second_output_are_caught() {

@@ -8,7 +8,7 @@ use policy::Policy;
 use targets::{Runner, TargetSpec};
 use verify::toolchain::{self, Build, BuildError, Purpose, Sources};
 
-use super::{example, files, golden_case};
+use super::{example, files, golden_case, legs};
 
 const STEPS: u32 = 100;
 const TIMEOUT: Duration = Duration::from_secs(120);
@@ -73,6 +73,24 @@ fn the_kit_passes_on_every_board() {
             "{}",
             target.name
         );
+    }
+}
+
+#[test]
+fn the_kit_of_several_outputs_passes_on_every_board() {
+    let policy = legs("constructs");
+    let mut files = kit(&policy);
+    for target in emulated() {
+        let found = run(&policy, target, &files, &[]).unwrap();
+        assert_eq!(found, (Some(0), 0), "{}", target.name);
+    }
+    let text = files.get_mut("constructs.c").unwrap();
+    let (from, to) = ("= command->duty[2];", "= command->duty[1];");
+    assert!(text.contains(from), "{text}");
+    *text = text.replacen(from, to, 1);
+    for target in emulated() {
+        let (code, failed) = run(&policy, target, &files, &[]).unwrap();
+        assert!(code == Some(1) && failed > 1, "{}: {failed}", target.name);
     }
 }
 

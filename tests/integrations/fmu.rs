@@ -2,6 +2,7 @@
 //! their prefix.
 
 mod faults;
+mod several;
 mod unit;
 
 use std::collections::BTreeSet;
@@ -39,14 +40,21 @@ fn agrees(policy: &Policy, periods: usize, outputs: &[Output], script: &[&str]) 
     }
     let trajectory = interpreted(policy, periods);
     let expected = lines(&trajectory);
+    let samples: Vec<Vec<Sample>> = trajectory.into_iter().map(|(samples, _)| samples).collect();
+    simulated(policy, &samples, &expected, outputs, script);
+}
+
+/// The importer answers these samples with these lines.
+#[track_caller]
+fn simulated(policy: &Policy, samples: &[Vec<Sample>], expected: &[String], outputs: &[Output], script: &[&str]) {
     for output in outputs {
         let unit = Unit::new(policy, *output);
-        let (ran, answers) = unit.simulate(&trajectory, script);
+        let (ran, answers) = unit.simulate(samples, script);
         let name = &policy.name;
         assert_eq!(ran.code, Some(0), "{name} {output:?}\n{}{}", ran.stdout, ran.stderr);
         assert!(!ran.stderr.contains("warning:"), "{name} {output:?}\n{}", ran.stderr);
-        assert_eq!(answers.len(), periods);
-        let different = answers.iter().zip(&expected).filter(|(a, b)| a != b).count();
+        assert_eq!(answers.len(), samples.len());
+        let different = answers.iter().zip(expected).filter(|(a, b)| a != b).count();
         assert_eq!(different, 0, "{name} {output:?}");
     }
 }

@@ -6,7 +6,7 @@ use codegen::Output;
 use policy::{NumericFormat, Policy};
 use tests::tools::Ran;
 
-use super::{build, build_silently, example, files, golden_case, run_program, write};
+use super::{build, build_silently, example, files, golden_case, legs, run_program, write};
 
 const STEPS: u32 = 200;
 
@@ -78,6 +78,67 @@ fn the_kit_passes_for_codes_filters_activations_and_policies_without_mapping() {
         let policy = golden_case(name);
         let ran = run_kit(&policy, &files(&policy, Output::Kit, STEPS), &COMPILERS[0]);
         assert_eq!(ran.code, Some(0), "{name}: {ran:?}");
+    }
+}
+
+/// Three legs, in both widths and as integers: choices with mappings of four and three terms beside a continuous output.
+#[test]
+fn the_kit_of_several_outputs_passes_under_every_compiler() {
+    let formats = [NumericFormat::F32, NumericFormat::I16].map(|format| legs("constructs").with_format(format));
+    for policy in formats.into_iter().chain([legs("wide")]) {
+        let files = files(&policy, Output::Kit, STEPS);
+        for compiler in COMPILERS {
+            let ran = run_kit(&policy, &files, compiler);
+            let command = compiler.command;
+            assert_eq!(ran.code, Some(0), "{} {command:?}: {ran:?}", policy.name);
+        }
+    }
+}
+
+/// Random policies have two to four outputs of any kind.
+#[test]
+fn the_kit_of_random_policies_with_several_outputs_passes() {
+    for seed in 0..if tests::full() { 20 } else { 4 } {
+        let folder = tests::several::policy(seed).unwrap();
+        let policy = policy::load_with(&folder.path(), &tests::several::options()).unwrap();
+        let ran = run_kit(&policy, &files(&policy, Output::Kit, STEPS), &COMPILERS[0]);
+        assert_eq!(ran.code, Some(0), "{}: {ran:?}", folder.contract);
+    }
+}
+
+/// Each of these leaves the first output as it is, apart from the last, which would show in the status word alone.
+#[test]
+fn a_defect_in_an_output_that_is_not_the_first_fails() {
+    let policy = legs("constructs");
+    let edits = [
+        (
+            "constructs_greedy(&outputs[2], 2u)",
+            "constructs_greedy(&outputs[0], 2u)",
+        ),
+        (
+            "constructs_greedy(&outputs[2], 2u)",
+            "constructs_greedy(&outputs[1], 2u)",
+        ),
+        ("command->duty[1];", "command->duty[0];"),
+        ("= command->duty_sim[1];", "= command->duty_sim[0];"),
+        ("= command->duty[2];", "= command->duty_sim[2];"),
+        ("state->mapping_b_right = b;", "state->mapping_b_right = a;"),
+        ("^ constructs_bits(state->mapping_c_right)", ""),
+        (
+            "state->mapping_check_right = 0x4B4B4B4Bu",
+            "state->mapping_check_right = 0x4B4B4B4Au",
+        ),
+        ("state->soft_cap_right = ", "state->soft_cap_left = "),
+        (
+            "state->previous_command_mid = 0.5f",
+            "state->previous_command_mid = 0.50000006f",
+        ),
+    ];
+    for (ran, (from, to)) in edited(&policy, &edits).into_iter().zip(edits) {
+        assert!(
+            ran.code == Some(1) && ran.stdout.contains("FAIL"),
+            "{from} => {to}: {ran:?}"
+        );
     }
 }
 

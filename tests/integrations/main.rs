@@ -23,6 +23,12 @@ fn golden_case(name: &str) -> Policy {
     policy::load(&path).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
+/// Three legs in the place of the one duty of that golden case.
+fn legs(case: &str) -> Policy {
+    let folder = tests::several::legs(case).unwrap();
+    policy::load_with(&folder.path(), &tests::several::options()).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
 fn example() -> Policy {
     policy::load(&tests::example()).unwrap_or_else(|faults| panic!("{faults}"))
 }

@@ -9,7 +9,7 @@ use policy::{Policy, Scalar};
 use tests::tools::{copy_folder, run_silently, rustc};
 use verify::traces::{Event, Stream};
 
-use super::{example, golden_case, write};
+use super::{example, golden_case, legs, write};
 
 const STEPS: u32 = 20_000;
 
@@ -106,25 +106,46 @@ fn another_policy_is_told_apart_in_both_languages() {
 #[test]
 fn the_c_core_answers_through_its_declarations_as_rust_does_in_both_widths() {
     for name in ["constructs", "wide"] {
-        let policy = golden_case(name);
-        let folder = tempfile::tempdir().unwrap();
-        let outputs = [Output::Rust, Output::RustOverC];
-        let generated = codegen::sources(&policy, targets::host(), &outputs, None);
-        let mut all = generated.unwrap().files;
-        let text = BOTH.replace("NAME", name).replace(
-            "NUMBER",
-            match policy.numeric_format.scalar() {
-                Scalar::F32 => "f32",
-                Scalar::F64 => "f64",
-            },
-        );
-        all.insert("both.rs".to_owned(), text);
-        write(&all, folder.path());
-        let object = ["-O1", "-ffp-contract=off", "-c", "-o", "core.o", &format!("{name}.c")].map(str::to_owned);
-        run_silently(Command::new("gcc").args(object).current_dir(folder.path()));
-        let flags = ["--edition=2021", "-O", "-Clink-arg=core.o", "both.rs"];
-        run_silently(rustc().args(flags).current_dir(folder.path()));
-        run_silently(&mut Command::new(folder.path().join("both")));
+        answer_alike(&golden_case(name), BOTH);
+    }
+}
+
+/// Runs the program with both controllers; it ends with an error where they differ.
+fn answer_alike(policy: &Policy, both: &str) {
+    let name = &policy.name;
+    let folder = tempfile::tempdir().unwrap();
+    let outputs = [Output::Rust, Output::RustOverC];
+    let generated = codegen::sources(policy, targets::host(), &outputs, None);
+    let mut all = generated.unwrap().files;
+    let text = both.replace("NAME", name).replace(
+        "NUMBER",
+        match policy.numeric_format.scalar() {
+            Scalar::F32 => "f32",
+            Scalar::F64 => "f64",
+        },
+    );
+    all.insert("both.rs".to_owned(), text);
+    write(&all, folder.path());
+    let object = ["-O1", "-ffp-contract=off", "-c", "-o", "core.o", &format!("{name}.c")].map(str::to_owned);
+    run_silently(Command::new("gcc").args(object).current_dir(folder.path()));
+    let flags = ["--edition=2021", "-O", "-Clink-arg=core.o", "both.rs"];
+    run_silently(rustc().args(flags).current_dir(folder.path()));
+    run_silently(&mut Command::new(folder.path().join("both")));
+}
+
+/// The same with three duties, and a function for each mapping.
+#[test]
+fn the_c_core_of_several_outputs_answers_through_its_declarations_as_rust_does() {
+    let step = "two.set_mapping_left(1.03, -0.0025, 0.006, 0.0009));
+            let right = if step % 200 == 50 { 0.97 } else { 7.0 };
+            assert_eq!(one.set_mapping_right(right, 0.001, 0.0), two.set_mapping_right(right, 0.001, 0.0));
+            assert_eq!(two.set_mapping_right(right, 0.001, 0.0), step % 200 == 50);";
+    let both = BOTH
+        .replace("one.set_mapping(", "one.set_mapping_left(")
+        .replace("two.set_mapping(1.03, -0.0025, 0.006, 0.0009));", step);
+    assert!(both.contains(step));
+    for case in ["constructs", "wide"] {
+        answer_alike(&legs(case), &both);
     }
 }
 

@@ -9,6 +9,7 @@ use tests::tools::Ran;
 use super::{build, build_silently, example, files, golden_case, run_program, write};
 
 mod config;
+mod several;
 
 use config::config;
 
@@ -56,9 +57,14 @@ impl Bench {
 
     /// Core, block and harness, which a planted fault of the S-function does not touch.
     fn prepare(&self, compiler: &[&str]) {
+        self.prepare_with(compiler, C90);
+    }
+
+    /// The same with other flags for core and block.
+    fn prepare_with(&self, compiler: &[&str], flags: &[&str]) {
         let own = [format!("{}.c", self.name), format!("{}_block.c", self.name)];
         for (source, object) in own.iter().zip(["core.o", "block.o"]) {
-            let built = self.object(compiler, C90, source, object);
+            let built = self.object(compiler, flags, source, object);
             assert!(built.code == Some(0) && built.stderr.is_empty(), "{}", built.stderr);
         }
         for (source, object) in [("standin.c", "standin.o"), ("harness.c", "harness.o")] {

@@ -1,8 +1,8 @@
 //! What `include_policy!` says to a user: rustc run on small files with the macro's library and a fixture crate around
 //! them. `cases/` must be rejected with the one error in `<name>.stderr`, `pass/` must build, run and end with 0.
 //!
-//! The fixture crate holds `policy/` (a copy of `examples/buck12`), `linear/` (a golden case) and `text/linear.rs` (its
-//! generated code); a file of a policy lies in `../outside/`. Lines `//@` of a case change it:
+//! The fixture crate holds `policy/` (a copy of `examples/buck12`), `linear/` (a golden case) and `legs/` (three outputs), and in
+//! `text/` the generated code of these two; a file of a policy lies in `../outside/`. Lines `//@` of a case change it:
 //! `replace: OLD => NEW` in `policy/policy.toml`, `write: FILE TEXT`, `grow: FILE BYTES`, `remove: FILE`.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -26,10 +26,15 @@ impl Fixture {
         copy_folder(&example, &fixture.path("policy"));
         copy_folder(&example, &fixture.path("../outside"));
         copy_folder(&linear, &fixture.path("linear"));
-        let policy = policy::load(&linear.join("policy.toml")).unwrap();
-        let text = generate(&policy, targets::find("host").unwrap(), &[codegen::Output::Rust]).unwrap();
+        let legs = tests::several::legs("constructs").unwrap();
+        copy_folder(legs.folder.path(), &fixture.path("legs"));
         std::fs::create_dir(fixture.path("text")).unwrap();
-        std::fs::write(fixture.path("text/linear.rs"), &text["linear.rs"]).unwrap();
+        for contract in [linear.join("policy.toml"), legs.path()] {
+            let policy = policy::load_with(&contract, &tests::several::options()).unwrap();
+            let text = generate(&policy, targets::find("host").unwrap(), &[codegen::Output::Rust]).unwrap();
+            let file = format!("{}.rs", policy.name);
+            std::fs::write(fixture.path("text").join(&file), &text[&file]).unwrap();
+        }
         for directive in case.lines().filter_map(|line| line.strip_prefix("//@ ")) {
             fixture.change(directive);
         }

@@ -2,7 +2,7 @@
 //! became. All of it is known to the command; nothing is computed for the page.
 
 use codegen::manifest::Sizes;
-use policy::Policy;
+use policy::{DutyPath, Policy};
 use report::{Axis, BarChart, BarPanel, Cell, Page, ReportError, Section, Table, Verdict, bytes, grouped};
 use targets::TargetSpec;
 use verify::Files;
@@ -220,12 +220,37 @@ fn parts(policy: &Policy) -> Vec<Part> {
     });
     let one = |name: &str, heading, mark: &str| part(name.to_owned(), (heading, 0), mark.to_owned());
     let mut all: Vec<Part> = signals.chain(features).chain(layers).collect();
-    all.push(one("choice of the action", "[actions]", "/* Network and argmax"));
-    if policy.mapping.is_some() {
-        all.push(one("mapping", "[mapping]", "state->mapping_b *"));
+    if policy.output_names().is_empty() {
+        all.push(one("choice of the action", "[actions]", "/* Network and argmax"));
+        if policy.mapping.is_some() {
+            all.push(one("mapping", "[mapping]", "state->mapping_b *"));
+        }
+        all.push(one("limits", "[limits]", "/* Mapping, limits, status. */"));
+    } else {
+        all.extend(policy.paths().iter().enumerate().flat_map(output_parts));
+        all.push(one("limits", "[[output]]", "/* Mapping, limits, status. */"));
     }
-    all.push(one("limits", "[limits]", "/* Mapping, limits, status. */"));
     all.push(one("fallback", "[fallback]", "front->usable & trusted"));
+    all
+}
+
+/// What is decided of one of several outputs, and its mapping.
+fn output_parts((index, path): (usize, &DutyPath<'_>)) -> Vec<Part> {
+    let name = path.name.unwrap_or_default();
+    let entry = ("[[output]]", index);
+    let command = format!("command->duty_sim[{index}] =");
+    let mut all = vec![Part {
+        name: format!("output {name}"),
+        heading: entry,
+        mark: command,
+    }];
+    if path.mapping.is_some() {
+        all.push(Part {
+            name: format!("mapping of {name}"),
+            heading: entry,
+            mark: format!("state->mapping_b_{name} *"),
+        });
+    }
     all
 }
 

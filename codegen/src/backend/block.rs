@@ -1,14 +1,17 @@
 //! The core behind ports of `double`: what the integrations into block diagrams share.
 
 use policy::Scalar;
-use templates::block::{BlockHeader, BlockSource, BlockView, InputView, ParameterView};
+use templates::block::{
+    AdjustView, BlockHeader, BlockSource, BlockView, DutyPort, InputView, OutputView, ParameterView,
+};
 use templates::c::Common;
 
+use super::c::duties::place;
 use super::c::render;
 use crate::backend::banner;
 use crate::backend::literal::number;
 use crate::files::{CodegenError, GeneratedFiles};
-use crate::program::{Coefficient, Literal, Program, SignalPort};
+use crate::program::{Coefficient, Literal, OutputCode, Program, SignalPort};
 
 /// `<name>_block.h` and `<name>_block.c`.
 ///
@@ -34,14 +37,6 @@ pub fn emit(program: &Program) -> Result<GeneratedFiles, CodegenError> {
 /// The view of a file of that title.
 pub fn view(program: &Program, title: &str) -> BlockView {
     let scalar = program.scalar();
-    let mapping = program.mapping();
-    let coefficients = || mapping.iter().flat_map(|mapping| &mapping.coefficients);
-    let parameter = |(name, value, low, high): &(Coefficient, Literal, Literal, Literal)| ParameterView {
-        name: name.name().to_owned(),
-        value: number(scalar, *value),
-        low: number(scalar, *low),
-        high: number(scalar, *high),
-    };
     BlockView {
         common: Common {
             name: program.name.clone(),
@@ -54,12 +49,15 @@ pub fn view(program: &Program, title: &str) -> BlockView {
         has_codes: program.signals.iter().any(|signal| signal.is_code),
         // and `enable`
         input_count: program.signals.len() + 1,
-        parameters: coefficients().map(parameter).collect(),
-        mapping_arguments: coefficients()
-            .map(|(name, ..)| name.name())
-            .collect::<Vec<_>>()
-            .join(", "),
-        fallback: number(scalar, program.fallback_duty()),
+        parameters: parameters(program),
+        mappings: program.outputs.iter().filter_map(adjusted).collect(),
+        duties: program
+            .outputs
+            .iter()
+            .enumerate()
+            .map(|own| duty(program, own))
+            .collect(),
+        outputs: outputs(program),
         sample_period: format!("{:?}", program.sample_period),
         // the state and one word
         // in doubles, which hold two words each
@@ -67,6 +65,61 @@ pub fn view(program: &Program, title: &str) -> BlockView {
         features: program.feature_count(),
         actions: program.head.outputs(),
     }
+}
+
+/// The coefficients of each mapping, `a_left` of the output `left`.
+fn parameters(program: &Program) -> Vec<ParameterView> {
+    let scalar = program.scalar();
+    let own = |output: &OutputCode| -> Vec<ParameterView> {
+        let coefficients = output.mapping.iter().flat_map(|mapping| &mapping.coefficients);
+        let view = |(name, value, low, high): &(Coefficient, Literal, Literal, Literal)| ParameterView {
+            name: output.named(name.name()),
+            value: number(scalar, *value),
+            low: number(scalar, *low),
+            high: number(scalar, *high),
+        };
+        coefficients.map(view).collect()
+    };
+    program.outputs.iter().flat_map(own).collect()
+}
+
+fn adjusted(output: &OutputCode) -> Option<AdjustView> {
+    let names = output.mapping.as_ref()?.coefficients.iter();
+    let names: Vec<String> = names.map(|(name, ..)| output.named(name.name())).collect();
+    Some(AdjustView {
+        function: output.named("set_mapping"),
+        arguments: names.join(", "),
+    })
+}
+
+fn duty(program: &Program, (index, output): (usize, &OutputCode)) -> DutyPort {
+    let suffix = output.named("");
+    DutyPort {
+        place: place(program, index),
+        upper: suffix.to_uppercase(),
+        suffix,
+        fallback: number(program.scalar(), output.fallback),
+    }
+}
+
+/// Scalars and no arrays: a block diagram wires a leg by its name.
+fn outputs(program: &Program) -> Vec<OutputView> {
+    let each = |stem: &'static str| program.outputs.iter().map(move |output| output.named(stem));
+    let of = |meaning: &'static str| move |name: String| (name, meaning.to_owned());
+    let status = format!("{}_STATUS_...", program.name.to_uppercase());
+    let all: Vec<(String, String)> = each("duty")
+        .map(of("commanded duty, 0..1"))
+        .chain(each("action").map(of("index of the greedy action, from 0")))
+        .chain([("status".to_owned(), status)])
+        .collect();
+    // and the semicolon
+    let width = 1 + all.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    let view = |(name, meaning): (String, String)| OutputView {
+        declarator: format!("{:width$}", format!("{name};")),
+        name,
+        meaning,
+    };
+    all.into_iter().map(view).collect()
 }
 
 fn input(scalar: Scalar, signal: &SignalPort) -> InputView {

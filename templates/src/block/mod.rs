@@ -28,6 +28,39 @@ pub struct ParameterView {
     pub high: String,
 }
 
+/// A mapping that the block sets.
+#[derive(Debug, Clone)]
+pub struct AdjustView {
+    /// Function of the core, without the prefix.
+    pub function: String,
+    /// Its arguments behind the state: names of parameters of the block.
+    pub arguments: String,
+}
+
+/// A duty of the command.
+#[derive(Debug, Clone)]
+pub struct DutyPort {
+    /// Subscript in the command; empty where there is one duty.
+    pub place: String,
+    /// `_left` of the output `left`; empty where there is one duty.
+    pub suffix: String,
+    /// The same for a macro.
+    pub upper: String,
+    /// Duty while the block is disabled.
+    pub fallback: String,
+}
+
+/// An output port.
+#[derive(Debug, Clone)]
+pub struct OutputView {
+    /// Name: also the member of the block's answer.
+    pub name: String,
+    /// Declarator of that member, as long as the longest.
+    pub declarator: String,
+    /// Meaning, for a comment.
+    pub meaning: String,
+}
+
 /// What all files of the block and of the integrations made of it need.
 #[derive(Debug, Clone)]
 pub struct BlockView {
@@ -39,12 +72,14 @@ pub struct BlockView {
     pub has_codes: bool,
     /// Number of input ports.
     pub input_count: usize,
-    /// Coefficients of the mapping in order; empty without.
+    /// Coefficients of the mappings in order; empty without.
     pub parameters: Vec<ParameterView>,
-    /// Arguments of `set_mapping` behind the state.
-    pub mapping_arguments: String,
-    /// Duty while the block is disabled.
-    pub fallback: String,
+    /// How they are set.
+    pub mappings: Vec<AdjustView>,
+    /// The duties, at least one.
+    pub duties: Vec<DutyPort>,
+    /// Output ports in order: duties, actions, status.
+    pub outputs: Vec<OutputView>,
     /// Control period in s.
     pub sample_period: String,
     /// Memory of the block in doubles.

@@ -29,12 +29,25 @@ pub struct Subject {
     pub state_crc: String,
     /// Numbers in the state, before its two counters, as a literal.
     pub state_numbers: String,
-    /// Words of the mapping's coefficients; 0 without.
-    pub coefficient_words: usize,
+    /// The mappings that can be set.
+    pub mappings: Vec<Settable>,
+}
+
+/// A mapping whose coefficients a move sets.
+#[derive(Debug, Clone)]
+pub struct Settable {
+    /// First word of the move, as a literal.
+    pub kind: String,
+    /// Function that sets it, without the prefix.
+    pub function: String,
+    /// What is compared, for the report.
+    pub what: String,
+    /// Words of its coefficients.
+    pub words: usize,
     /// Declarations of locals that hold them.
-    pub coefficient_locals: Vec<String>,
+    pub locals: Vec<String>,
     /// The same as arguments.
-    pub mapping_arguments: String,
+    pub arguments: String,
 }
 
 /// `<name>_kit.c`

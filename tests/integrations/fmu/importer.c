@@ -1,7 +1,7 @@
 /*
  * A program that imports an FMU: `importer LIBRARY run` steps one instance with inputs from standard input, `importer
  * LIBRARY check` looks at how instances behave. Build with -DFMI=2 or 3 and, for functions with a prefix, -DSTATIC;
- * config.h describes the FMU: NAME, TOKEN, PERIOD, KINDS of the inputs, LOWS, HIGHS, PARAMETERS, FALLBACK.
+ * config.h describes the FMU: NAME, TOKEN, PERIOD, KINDS of the inputs, LOWS, HIGHS, PARAMETERS, DUTIES, FALLBACKS.
  */
 #include <inttypes.h>
 #include <stdint.h>
@@ -15,17 +15,18 @@
 #define INPUTS (sizeof(KINDS) - 1u)
 #define ENABLE ((unsigned)INPUTS)
 #define DUTY (ENABLE + 1u)
-#define ACTION (ENABLE + 2u)
-#define STATUS (ENABLE + 3u)
-#define FIRST_PARAMETER (ENABLE + 4u)
+#define ACTION (DUTY + DUTIES)
+#define STATUS (ACTION + DUTIES)
+#define FIRST_PARAMETER (STATUS + 1u)
 #define STEPS 300u
 
 typedef struct {
-    double duty, action, status;
+    double duty[DUTIES], action[DUTIES], status;
 } answer;
 
 static const double lows[] = LOWS;
 static const double highs[] = HIGHS;
+static const double fallbacks[] = FALLBACKS;
 
 static void check(int holds, const char *what)
 {
@@ -38,8 +39,11 @@ static void check(int holds, const char *what)
 static answer outputs(const api *f, instance_type c)
 {
     answer all;
-    check(get(f, c, DUTY, 'r', &all.duty) == OK, "duty can be read");
-    check(get(f, c, ACTION, 'i', &all.action) == OK, "action can be read");
+    unsigned i;
+    for (i = 0u; i < DUTIES; ++i) {
+        check(get(f, c, DUTY + i, 'r', &all.duty[i]) == OK, "duty can be read");
+        check(get(f, c, ACTION + i, 'i', &all.action[i]) == OK, "action can be read");
+    }
     check(get(f, c, STATUS, 'i', &all.status) == OK, "status can be read");
     return all;
 }
@@ -207,6 +211,7 @@ static void variables(const api *f)
 {
     instance_type c = begin(f);
     unsigned before = logged;
+    answer held;
     double x;
 
     check(set(f, c, DUTY, 'r', 0.3) == ERROR, "an output cannot be set");
@@ -221,7 +226,8 @@ static void variables(const api *f)
     check(not_refused(f, c) == 0, "what co-simulation does not have is refused");
     check(logged == before + REFUSED_AND_LOGGED, "every refused call has a message");
     check(set(f, c, ENABLE, 'b', 0.0) == OK && step(f, c, 2.0, PERIOD) == OK, "a disabled controller takes steps");
-    check(outputs(f, c).duty == FALLBACK, "a disabled controller gives the fallback duty");
+    held = outputs(f, c);
+    check(memcmp(held.duty, fallbacks, sizeof(held.duty)) == 0, "a disabled controller gives the fallback duty");
     FREE(c);
 }
 
@@ -275,8 +281,14 @@ static void run(const api *f)
         }
         check(step(f, c, 2.0 + k * PERIOD, PERIOD) == OK, "a step of the control period is taken");
         all = outputs(f, c);
-        memcpy(&bits, &all.duty, sizeof(bits));
-        printf("%016" PRIx64 " %.0f %.0f\n", bits, all.action, all.status);
+        for (i = 0u; i < DUTIES; ++i) {
+            memcpy(&bits, &all.duty[i], sizeof(bits));
+            printf("%016" PRIx64 " ", bits);
+        }
+        for (i = 0u; i < DUTIES; ++i) {
+            printf("%.0f ", all.action[i]);
+        }
+        printf("%.0f\n", all.status);
         fflush(stdout);
     }
 }

@@ -1,7 +1,7 @@
 """What FMPy says of an FMU and how it simulates it: `simulate.py FMU SIGNALS TRAJECTORY [--compile]`.
 
 SIGNALS is a CSV file with a header: time and inputs, a row per communication point. TRAJECTORY is written with one line per
-control period: the bits of duty, then action and status. Exit code 1 if FMPy finds a problem.
+control period: the bits of each duty, then the actions and the status. Exit code 1 if FMPy finds a problem.
 """
 
 import os
@@ -38,6 +38,7 @@ def main(fmu, inputs, trajectory, *options):
     period = description.defaultExperiment.stepSize
     period = float(period)
     outputs = [v.name for v in description.modelVariables if v.causality == "output"]
+    duties = outputs[: len(outputs) // 2]
     result = fmpy.simulate_fmu(
         folder,
         fmi_type="CoSimulation",
@@ -54,8 +55,9 @@ def main(fmu, inputs, trajectory, *options):
         problems.append(f"{len(result)} rows for {len(table)} steps")
     with open(trajectory, "w") as file:
         for row in result[1:]:
-            duty, action, status = (row[name] for name in outputs)
-            file.write(f"{struct.pack('>d', duty).hex()} {int(action)} {int(status)}\n")
+            words = [struct.pack(">d", row[name]).hex() for name in duties]
+            words += [str(int(row[name])) for name in outputs[len(duties) :]]
+            file.write(" ".join(words) + "\n")
     for problem in problems + said:
         print(problem)
     sys.exit(1 if problems or said else 0)

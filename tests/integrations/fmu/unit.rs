@@ -184,18 +184,24 @@ impl Unit {
             let texts: Vec<String> = signals.iter().map(|signal| format!("{:?}", arrives(signal))).collect();
             texts.join(", ")
         };
-        let coefficients = self
-            .policy
-            .mapping
-            .as_ref()
-            .map_or(0, |mapping| 3 + usize::from(mapping.coefficients.r.is_some()));
+        let paths = self.policy.paths();
+        let mappings = paths.iter().filter_map(|path| path.mapping);
+        let coefficients: usize = mappings
+            .map(|mapping| 3 + usize::from(mapping.coefficients.r.is_some()))
+            .sum();
+        let scalar = self.policy.numeric_format.scalar();
+        let fallbacks: Vec<String> = paths
+            .iter()
+            .map(|path| format!("{:?}", scalar.nearest(path.fallback)))
+            .collect();
         format!(
             "#define NAME {name}_\n#define TOKEN \"{token}\"\n#define PERIOD {:?}\n#define KINDS \"{kinds}b\"\n\
-             #define LOWS {{ {} }}\n#define HIGHS {{ {} }}\n#define PARAMETERS {coefficients}\n#define FALLBACK {:?}\n",
+             #define LOWS {{ {} }}\n#define HIGHS {{ {} }}\n#define PARAMETERS {coefficients}\n#define DUTIES {}\n#define FALLBACKS {{ {} }}\n",
             self.policy.sample_period,
             list(|range| range.low),
             list(|range| range.high),
-            self.policy.numeric_format.scalar().nearest(self.policy.fallback.duty)
+            paths.len(),
+            fallbacks.join(", ")
         )
     }
 
@@ -263,12 +269,12 @@ impl Unit {
     }
 
     /// What an importer in Python, a script with its options, says of the FMU and how it simulates it with these samples.
-    pub fn simulate(&self, trajectory: &[(Vec<Sample>, Answer)], script: &[&str]) -> (Ran, Vec<String>) {
+    pub fn simulate(&self, trajectory: &[Vec<Sample>], script: &[&str]) -> (Ran, Vec<String>) {
         let mut table = "time".to_owned();
         for signal in &self.policy.signals {
             let _ = write!(table, ",{}", signal.name);
         }
-        for (index, (samples, _)) in trajectory.iter().enumerate() {
+        for (index, samples) in trajectory.iter().enumerate() {
             let _ = write!(table, "\n{:?}", index as f64 * self.policy.sample_period);
             for sample in samples {
                 let _ = write!(table, ",{:?}", value(*sample));
@@ -301,6 +307,12 @@ pub struct Running {
 
 impl Running {
     pub fn step(&mut self, samples: &[Sample]) -> Result<Answer, String> {
+        let line = self.line(samples)?;
+        parse(&line).ok_or(line)
+    }
+
+    /// What the program says of a step: bits of each duty, then the actions and the status.
+    pub fn line(&mut self, samples: &[Sample]) -> Result<String, String> {
         let enabled = [1.0];
         let values = samples.iter().map(|sample| value(*sample)).chain(enabled);
         let words: Vec<String> = values.map(|value| format!("{:x}", value.to_bits())).collect();
@@ -308,7 +320,7 @@ impl Running {
         writeln!(input, "{}", words.join(" ")).map_err(|error| error.to_string())?;
         let mut line = String::new();
         self.answers.read_line(&mut line).map_err(|error| error.to_string())?;
-        parse(line.trim()).ok_or(line)
+        Ok(line.trim().to_owned())
     }
 }
 

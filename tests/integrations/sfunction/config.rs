@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use policy::{Interval, Policy, Scalar};
+use policy::{Interval, Mapping, Policy, Scalar};
 
 /// What the harness must know of a policy, as C.
 pub fn config(policy: &Policy) -> String {
@@ -16,13 +16,8 @@ pub fn config(policy: &Policy) -> String {
         };
         list(policy.signals.iter().map(value).collect())
     };
-    let arguments: String = (0..coefficients.len())
-        .map(|i| format!(", arriving(values[{i}])"))
-        .collect();
-    let set_mapping = match coefficients.is_empty() {
-        true => "(void)state; (void)values; return 1u;".to_owned(),
-        false => format!("return {n}_set_mapping(state{arguments});"),
-    };
+    let set_mapping = set_mapping(policy);
+    let commanded = commanded(policy);
     let arriving = match policy.numeric_format.scalar() {
         Scalar::F32 => {
             "typedef float number;\nstatic number arriving(double x)\n{\n    \
@@ -43,7 +38,7 @@ pub fn config(policy: &Policy) -> String {
 #define FEATURES {features}
 #define ACTIONS {actions}
 #define PERIOD {period:?}
-#define FALLBACK ((number){fallback:?})
+#define DUTIES {duties}
 #define NAN_VALUE (HUGE_VAL - HUGE_VAL)
 #define CONTROLLER(type) {n}_##type
 #define CONTROLLER_CALL(function) {n}_##function
@@ -53,6 +48,7 @@ static const double coefficient_values[COEFFICIENTS + 1] = {values};
 static const double coefficient_lows[COEFFICIENTS + 1] = {coefficient_lows};
 static const double coefficient_highs[COEFFICIENTS + 1] = {coefficient_highs};
 static const double coefficient_zero = 0.0;
+static const double fallbacks[DUTIES] = {fallbacks};
 {arriving}
 static int32_t code(double x)
 {{
@@ -67,13 +63,17 @@ static uint32_t set_mapping({n}_state *state, const double *values)
 {{
     {set_mapping}
 }}
+static void commanded(const {n}_command *command, double *duties, double *actions)
+{{
+{commanded}}}
 ",
         signals = policy.signals.len(),
         count = coefficients.len(),
         features = policy.features.len(),
         actions = policy.outputs(),
         period = policy.sample_period,
-        fallback = policy.fallback.duty,
+        duties = policy.paths().len(),
+        fallbacks = list(policy.paths().iter().map(|path| path.fallback).collect()),
         lows = arrives(|range| range.low),
         highs = arrives(|range| range.high),
         values = list(coefficients.iter().map(|(value, _)| *value).collect()),
@@ -82,11 +82,47 @@ static uint32_t set_mapping({n}_state *state, const double *values)
     )
 }
 
-/// What can be set at run time: value and range of each coefficient of the mapping.
+/// Sets every mapping with its part of the values; 1 if all were accepted.
+fn set_mapping(policy: &Policy) -> String {
+    let mut text = "(void)state; (void)values;\n    uint32_t accepted = 1u;".to_owned();
+    let mut first = 0;
+    for path in policy.paths() {
+        let count = path.mapping.map_or(0, |mapping| of_mapping(mapping).len());
+        if count == 0 {
+            continue;
+        }
+        let arguments: String = (first..first + count)
+            .map(|i| format!(", arriving(values[{i}])"))
+            .collect();
+        first += count;
+        let function = path.named("set_mapping");
+        let _ = write!(text, "\n    accepted &= {}_{function}(state{arguments});", policy.name);
+    }
+    text + "\n    return accepted;"
+}
+
+/// The duties and actions of a command, one after the other.
+fn commanded(policy: &Policy) -> String {
+    let mut text = String::new();
+    for (index, path) in policy.paths().iter().enumerate() {
+        let place = path.name.map_or(String::new(), |_| format!("[{index}]"));
+        let _ = writeln!(text, "    duties[{index}] = (double)command->duty{place};");
+        let _ = writeln!(text, "    actions[{index}] = (double)command->action_index{place};");
+    }
+    text
+}
+
+/// What can be set at run time: value and range of each coefficient of the mappings.
 fn coefficients(policy: &Policy) -> Vec<(f64, Interval)> {
-    let Some(mapping) = &policy.mapping else {
-        return Vec::new();
-    };
+    let paths = policy.paths();
+    paths
+        .iter()
+        .filter_map(|path| path.mapping)
+        .flat_map(of_mapping)
+        .collect()
+}
+
+fn of_mapping(mapping: &Mapping) -> Vec<(f64, Interval)> {
     let own = mapping.coefficients;
     let mut all = vec![
         (own.a, mapping.adjust_a),

@@ -164,7 +164,7 @@ static void start(instance *own, int diagnostics)
     prepare(S, diagnostics);
     expect(S->error == NULL, "sizes set an error");
     expect(S->expected_parameters == COEFFICIENTS + 1, "number of parameters");
-    expect((S->inputs == SIGNALS + 1) && (S->outputs == ((diagnostics != 0) ? 5 : 3)), "number of ports");
+    expect((S->inputs == SIGNALS + 1) && (S->outputs == ((diagnostics != 0) ? (2 * DUTIES) + 3 : (2 * DUTIES) + 1)), "number of ports");
     expect((S->continuous_states == 0) && (S->discrete_states == 0), "states");
     expect((S->sample_times == 1) && (S->dworks == 1), "sample times or DWork");
     expect((S->dwork_named == 1) && (S->dwork_is_state == 1), "the DWork has no name or is no state");
@@ -290,17 +290,25 @@ static void compare(instance *own, const double *inputs, int diagnostics)
     CONTROLLER(measurement) measured;
     CONTROLLER(command) command;
     const double refused = (own->refused != 0) ? 65536.0 : 0.0;
+    double duties[DUTIES];
+    double actions[DUTIES];
+    int duty;
     measure(inputs, &measured);
     if (inputs[SIGNALS] > 0.5) {
         CONTROLLER_CALL(eval)(&own->core, &measured, &command);
+        commanded(&command, duties, actions);
     } else {
-        command.duty = FALLBACK;
-        command.action_index = 0u;
+        for (duty = 0; duty < DUTIES; ++duty) {
+            duties[duty] = (double)(number)fallbacks[duty];
+            actions[duty] = 0.0;
+        }
         command.status = 2u;
     }
-    expect(same(own->s.output[0].signal[CANARY], (double)command.duty), "duty");
-    expect(same(own->s.output[1].signal[CANARY], (double)command.action_index), "action");
-    expect(same(own->s.output[2].signal[CANARY], (double)command.status + refused), "status");
+    for (duty = 0; duty < DUTIES; ++duty) {
+        expect(same(own->s.output[duty].signal[CANARY], duties[duty]), "duty");
+        expect(same(own->s.output[DUTIES + duty].signal[CANARY], actions[duty]), "action");
+    }
+    expect(same(own->s.output[2 * DUTIES].signal[CANARY], (double)command.status + refused), "status");
     if (diagnostics != 0) {
         number observation[FEATURES];
         number q[ACTIONS];
@@ -308,10 +316,10 @@ static void compare(instance *own, const double *inputs, int diagnostics)
         CONTROLLER_CALL(observe)(&own->core, &measured, observation);
         CONTROLLER_CALL(q_values)(observation, q);
         for (i = 0; i < ACTIONS; ++i) {
-            expect(same(own->s.output[3].signal[CANARY + i], (double)q[i]), "Q values");
+            expect(same(own->s.output[(2 * DUTIES) + 1].signal[CANARY + i], (double)q[i]), "Q values");
         }
         for (i = 0; i < FEATURES; ++i) {
-            expect(same(own->s.output[4].signal[CANARY + i], (double)observation[i]), "observation");
+            expect(same(own->s.output[(2 * DUTIES) + 2].signal[CANARY + i], (double)observation[i]), "observation");
         }
     }
 }

@@ -15,7 +15,7 @@ typedef struct {
     int is_complex;
 } mxArray;
 
-enum { MAX_PORTS = 40, MAX_PARAMETERS = 8, MAX_WIDTH = 600, CANARY = 8 };
+enum { MAX_PORTS = 40, MAX_PARAMETERS = 40, MAX_WIDTH = 600, CANARY = 8 };
 
 enum { SIZES = 1, SAMPLE_TIMES = 2, WORK_WIDTHS = 4, CHECK = 8, RTW = 16, INITIALIZE = 32, OUTPUTS = 64, UPDATE = 128, TERMINATE = 256 };
 

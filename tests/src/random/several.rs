@@ -26,6 +26,83 @@ pub fn policy(seed: u64) -> std::io::Result<Folder> {
     Ok(Folder { folder, contract })
 }
 
+/// A golden case of twelve features and five columns, `constructs` or `wide`, as three legs: two choices with mappings of four and
+/// three terms, slew limit and soft start, and a continuous one with its limits alone.
+///
+/// # Errors
+/// If the case cannot be read or the folder cannot be written.
+pub fn legs(case: &str) -> std::io::Result<Folder> {
+    let from = crate::root().join("tests/golden/cases").join(case);
+    let folder = tempfile::tempdir()?;
+    let read = |name: &str| std::fs::read_to_string(from.join(name));
+    let single = read("policy.toml")?;
+    let (top, _) = single
+        .split_once("[actions]")
+        .ok_or_else(|| std::io::Error::other("no [actions]"))?;
+    let top = top
+        .replace("\"previous_duty\"", "\"left_previous_duty\"")
+        .replace("previous_command", "right_previous_command");
+    let contract = top + LEGS;
+    let mapping = read("drm.toml")?;
+    let three = mapping.lines().filter(|line| !line.starts_with("r = "));
+    let three: String = three.map(|line| format!("{line}\n")).collect();
+    std::fs::write(folder.path().join("policy.toml"), &contract)?;
+    std::fs::write(folder.path().join("left.toml"), mapping)?;
+    std::fs::write(
+        folder.path().join("right.toml"),
+        three.replace("b = -0.0025", "b = -0.0015"),
+    )?;
+    std::fs::copy(
+        from.join("weights.safetensors"),
+        folder.path().join("weights.safetensors"),
+    )?;
+    Ok(Folder { folder, contract })
+}
+
+const LEGS: &str = r#"[[output]]
+name = "left"
+[output.actions]
+duties = [0.4, 0.6]
+[output.mapping]
+file = "left.toml"
+load_current = "i_out"
+[output.limits]
+duty = [0.3, 0.68]
+slew = 0.06
+soft_start = { from = 0.35, steps = 20 }
+initial_duty = 0.45
+[output.fallback]
+duty = 0.02
+
+[[output]]
+name = "right"
+[output.actions]
+duties = [0.35, 0.62]
+[output.mapping]
+file = "right.toml"
+load_current = "i_out"
+[output.limits]
+duty = [0.25, 0.75]
+slew = 0.05
+soft_start = { from = 0.3, steps = 40 }
+initial_duty = 0.4
+[output.fallback]
+duty = 0.05
+
+[[output]]
+name = "mid"
+[output.actions]
+continuous = { squash = "tanh", scale = 0.3, offset = 0.5 }
+[output.limits]
+duty = [0.48, 0.52]
+initial_duty = 0.5
+[output.fallback]
+duty = 0.1
+
+[fallback]
+hold = 3
+"#;
+
 /// How a contract with several outputs is read.
 #[must_use]
 pub fn options() -> policy::ReadOptions {

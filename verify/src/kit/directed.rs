@@ -4,7 +4,7 @@
 //! A random stream comes to most of these places only now and then. A kit of a few hundred steps has no time for that.
 
 use interp::Sample;
-use policy::{Expr, Input, Interval, Policy, Scalar, Signal};
+use policy::{Expr, Input, Interval, Mapping, Policy, Scalar, Signal};
 
 use crate::traces::{Event, nudged, sample_of};
 
@@ -29,9 +29,11 @@ pub fn moves(policy: &Policy) -> Vec<Move> {
     runs(policy, &good, &mut moves);
     let scalar = policy.numeric_format.scalar();
     for (index, signal) in policy.signals.iter().enumerate() {
-        let load = policy.mapping.as_ref().filter(|mapping| mapping.load_current == index);
-        let ranges = [Some(signal.range), load.map(|mapping| mapping.valid_i_out)];
-        for range in ranges.into_iter().flatten() {
+        let paths = policy.paths();
+        let mappings = paths.iter().filter_map(|path| path.mapping);
+        let loads = mappings.filter(|mapping| mapping.load_current == index);
+        let ranges = std::iter::once(signal.range).chain(loads.map(|mapping| mapping.valid_i_out));
+        for range in ranges {
             moves.extend(ends(scalar, signal, range).map(|sample| Event::Step(with(&good, index, sample))));
         }
         if signal.adc.is_none() {
@@ -42,7 +44,14 @@ pub fn moves(policy: &Policy) -> Vec<Move> {
     }
     clips(policy, &good, &mut moves);
     let settled = std::iter::once(Move::Settle).chain(moves.into_iter().map(Move::Do));
-    settled.chain(coefficients(policy, &good)).collect()
+    let paths = policy.paths();
+    let mappings = paths
+        .iter()
+        .enumerate()
+        .filter_map(|(output, path)| Some((output, path.mapping?)));
+    let scalar = policy.numeric_format.scalar();
+    let adjusted = mappings.flat_map(|(output, mapping)| coefficients(scalar, output, mapping, &good));
+    settled.chain(adjusted).collect()
 }
 
 /// The farthest corners of each clipped source: one end, the other twice, and back, so that a difference to the sample before is far
@@ -141,17 +150,13 @@ fn runs(policy: &Policy, good: &[Sample], moves: &mut Vec<Event>) {
     }
 }
 
-/// Each coefficient of the mapping at the ends of what it may be set to, and next to them, then all at one end, where the
+/// Each coefficient of the mapping of an output at the ends of what it may be set to, and next to them, then all at one end, where the
 /// duty leaves its limits; the policy's own at last.
-fn coefficients(policy: &Policy, good: &[Sample]) -> Vec<Move> {
-    let Some(mapping) = &policy.mapping else {
-        return Vec::new();
-    };
-    let scalar = policy.numeric_format.scalar();
+fn coefficients(scalar: Scalar, output: usize, mapping: &Mapping, good: &[Sample]) -> Vec<Move> {
     let own = mapping.coefficients;
     let set = |[a, b, c, r]: [f64; 4]| {
         let r = own.r.map(|_| r);
-        Move::Do(Event::SetMapping { output: 0, a, b, c, r })
+        Move::Do(Event::SetMapping { output, a, b, c, r })
     };
     let own_values = [own.a, own.b, own.c, own.r.unwrap_or(0.0)].map(|value| scalar.nearest(value));
     let ranges = [mapping.adjust_a, mapping.adjust_b, mapping.adjust_c, mapping.adjust_r];

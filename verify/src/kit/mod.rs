@@ -1,6 +1,7 @@
 //! What the back-to-back kit compares with: the interpreter's answers on the policy and on the construct suite.
 
 mod course;
+mod damage;
 mod directed;
 
 use codegen::backend::kit::{Material, Trace};

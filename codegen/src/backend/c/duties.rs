@@ -37,7 +37,8 @@ pub fn length(program: &Program) -> String {
     }
 }
 
-fn place(program: &Program, index: usize) -> String {
+/// Subscript of a member that each output has.
+pub fn place(program: &Program, index: usize) -> String {
     match program.has_several() {
         true => format!("[{index}]"),
         false => String::new(),

@@ -1,6 +1,6 @@
 //! C99 that also compiles as C90 with `stdint.h` and as C++: one header, one source.
 
-mod duties;
+pub(super) mod duties;
 mod guard;
 mod integer;
 pub(super) mod number;

@@ -1,11 +1,11 @@
 //! The variables of an FMU: the block's ports and parameters with types, units and start values.
 
 use policy::Scalar;
-use templates::block::BlockView;
+use templates::block::{BlockView, ParameterView};
 use templates::fmu::{Kind, UnitView, VariableView};
 
 use crate::backend::literal::number;
-use crate::program::{Program, SignalPort};
+use crate::program::{OutputCode, Program, SignalPort};
 
 /// Inputs, `enable`, outputs, parameters; and a name for the time that none of them has.
 pub fn of(program: &Program, block: &BlockView) -> (Vec<VariableView>, String) {
@@ -22,43 +22,41 @@ pub fn of(program: &Program, block: &BlockView) -> (Vec<VariableView>, String) {
         ..plain("input", "discrete", format!("inputs[{}]", program.signals.len()))
             .meaning("true: works; false: fallback duty, state as after start")
     });
-    for (index, (name, kind, meaning)) in [
-        (
-            "duty",
-            Kind::Real,
-            "commanded duty, 0 to 1, for the control period that begins with the step",
-        ),
-        ("action", Kind::Integer, "index of the greedy action, from 0"),
-        (
-            "status",
-            Kind::Integer,
-            "status bits; 65536 is added while the coefficients are refused",
-        ),
-    ]
-    .into_iter()
-    .enumerate()
-    {
+    for (index, (name, kind, meaning)) in outputs(program).into_iter().enumerate() {
         all.push(VariableView {
-            name: name.to_owned(),
+            name,
             kind,
             initial: Some("calculated"),
             ..plain("output", "discrete", format!("outputs[{index}]")).meaning(meaning)
         });
     }
-    let coefficients = program.mapping().into_iter().flat_map(|mapping| &mapping.coefficients);
-    for (index, (name, value, low, high)) in coefficients.enumerate() {
-        let [value, low, high] = [value, low, high].map(|literal| number(scalar, *literal));
+    for (index, parameter) in block.parameters.iter().enumerate() {
+        let ParameterView { name, value, low, high } = parameter;
         all.push(VariableView {
-            name: name.name().to_owned(),
+            name: name.clone(),
             initial: Some("exact"),
             attributes: format!(" min=\"{low}\" max=\"{high}\" start=\"{value}\""),
-            start_c: Some(value),
+            start_c: Some(value.clone()),
             ..plain("parameter", "tunable", format!("coefficients[{index}]"))
                 .meaning("coefficient of the duty ratio mapping; set before a step, it counts from the one after it")
         });
     }
     let time = name_all(&mut all, program);
     (all, time)
+}
+
+/// Name, type and meaning of each output, in the order of the block's: `duty_left` of the output `left`.
+fn outputs(program: &Program) -> Vec<(String, Kind, &'static str)> {
+    let each = |stem, kind, meaning| {
+        let named = move |output: &OutputCode| (output.named(stem), kind, meaning);
+        program.outputs.iter().map(named)
+    };
+    let duty = "commanded duty, 0 to 1, for the control period that begins with the step";
+    let status = "status bits; 65536 is added while the coefficients are refused";
+    each("duty", Kind::Real, duty)
+        .chain(each("action", Kind::Integer, "index of the greedy action, from 0"))
+        .chain([("status".to_owned(), Kind::Integer, status)])
+        .collect()
 }
 
 /// Signals keep their names; our own names give way with underscores.

@@ -10,7 +10,7 @@ mod trace;
 use std::collections::BTreeMap;
 
 use templates::c::Common;
-use templates::kit::{Kit, Subject};
+use templates::kit::{Kit, Settable, Subject};
 
 use super::c::number::{kind, number};
 use super::c::statements::unsigned;
@@ -18,7 +18,7 @@ use super::c::tables::view as table;
 use super::c::{self, render};
 use crate::backend::banner;
 use crate::files::{CodegenError, GeneratedFiles};
-use crate::program::{Element, Literal, Program, Table, words as number_words};
+use crate::program::{Element, Literal, OutputCode, Program, Table, words as number_words};
 
 use texts::Texts;
 pub use trace::Trace;
@@ -88,8 +88,6 @@ fn core(program: &Program) -> Result<String, CodegenError> {
 }
 
 fn subject(kit: &str, program: &Program, trace: &Trace) -> Subject {
-    let coefficients = program.mapping().into_iter().flat_map(|mapping| &mapping.coefficients);
-    let coefficients: Vec<&str> = coefficients.map(|(name, ..)| name.name()).collect();
     let texts = Texts { kit, program };
     let (measurement, measurement_words) = texts.measurement();
     Subject {
@@ -104,8 +102,25 @@ fn subject(kit: &str, program: &Program, trace: &Trace) -> Subject {
         rest: texts.rest(),
         state_crc: texts.state_crc("0xFFFFFFFFu", "state."),
         state_numbers: unsigned(((program.state_words() - 2) / program.scalar().words()) as u32),
-        coefficient_words: program.scalar().words() * coefficients.len(),
-        coefficient_locals: texts.coefficients(&coefficients),
-        mapping_arguments: coefficients.join(", "),
+        mappings: settable(&texts),
     }
+}
+
+/// The functions that set a mapping, and how the kit calls them.
+fn settable(texts: &Texts<'_>) -> Vec<Settable> {
+    let view = |(index, output): (usize, &OutputCode)| {
+        let coefficients = output.mapping.as_ref()?.coefficients.iter();
+        let coefficients: Vec<&str> = coefficients.map(|(name, ..)| name.name()).collect();
+        let of = output.name.as_ref().map_or(String::new(), |name| format!(" of {name}"));
+        Some(Settable {
+            kind: unsigned(trace::mapping_kind(index)),
+            function: output.named("set_mapping"),
+            what: format!("mapping{of} accepted"),
+            words: texts.program.scalar().words() * coefficients.len(),
+            locals: texts.coefficients(&coefficients),
+            arguments: coefficients.join(", "),
+        })
+    };
+    let outputs = texts.program.outputs.iter().enumerate();
+    outputs.filter_map(view).collect()
 }

@@ -2,7 +2,8 @@
 
 use policy::Scalar;
 
-use crate::program::Program;
+use crate::backend::c::duties;
+use crate::program::{OutputCode, Program};
 
 /// Statements for one controller of a kit.
 pub struct Texts<'a> {
@@ -51,23 +52,39 @@ impl Texts<'_> {
         format!("{k}_check(\"{s}\", \"{what}\", event, word[{word}], {found});")
     }
 
-    /// Comparisons of the command.
+    /// Comparisons of the command: as they stand in the trace, the duties, the duties before the mapping, the actions, status.
     pub fn answer(&self) -> Vec<String> {
-        let number = self.program.scalar().words();
-        vec![
-            self.check_number("duty", 0, "command.duty"),
-            self.check_number("duty before the mapping", number, "command.duty_sim"),
-            self.check("action", 2 * number, "command.action_index"),
-            self.check("status", 2 * number + 1, "command.status"),
-            self.check_number("duty of eval", 0, "first.duty"),
-        ]
+        let (number, count) = (self.program.scalar().words(), self.program.outputs.len());
+        let each = || self.program.outputs.iter().enumerate();
+        let named = |output: &OutputCode| output.name.as_ref().map_or(String::new(), |name| format!(" {name}"));
+        let place = |index: usize| duties::place(self.program, index);
+        let duty = |(index, output): (usize, &OutputCode)| {
+            let found = format!("command.duty{}", place(index));
+            self.check_number(&format!("duty{}", named(output)), number * index, &found)
+        };
+        let duty_sim = |(index, output): (usize, &OutputCode)| {
+            let what = format!("duty{} before the mapping", named(output));
+            let found = format!("command.duty_sim{}", place(index));
+            self.check_number(&what, number * (count + index), &found)
+        };
+        let action = |(index, output): (usize, &OutputCode)| {
+            let found = format!("command.action_index{}", place(index));
+            self.check(&format!("action{}", named(output)), 2 * number * count + index, &found)
+        };
+        let of_eval = |(index, output): (usize, &OutputCode)| {
+            let what = format!("duty{} of eval", named(output));
+            self.check_number(&what, number * index, &format!("first.duty{}", place(index)))
+        };
+        let status = self.check("status", (2 * number + 1) * count, "command.status");
+        let command = each().map(duty).chain(each().map(duty_sim)).chain(each().map(action));
+        command.chain([status]).chain(each().map(of_eval)).collect()
     }
 
     /// Checksum of the rest of the answer, its comparison, and the way to the next move.
     pub fn rest(&self) -> Vec<String> {
         let (k, u) = (self.kit, self.program.name.to_uppercase());
         let crc = if self.is_wide() { "crc_numbers" } else { "crc" };
-        let last = 2 * self.program.scalar().words() + 2;
+        let last = (2 * self.program.scalar().words() + 1) * self.program.outputs.len() + 1;
         vec![
             format!("crc = {k}_{crc}(0xFFFFFFFFu, observation, are_numbers * {u}_FEATURES);"),
             format!("crc = {k}_{crc}(crc, q, are_numbers * {u}_ACTIONS);"),

@@ -6,6 +6,8 @@ use crate::crc::crc32_words;
 mod kind {
     pub const STEP: u32 = 0;
     pub const SET_MAPPING: u32 = 1;
+    /// Added once for each output before the one whose mapping is set.
+    pub const OUTPUT: u32 = 16;
     pub const RESET: u32 = 2;
     pub const INIT: u32 = 3;
     pub const DAMAGE: u32 = 4;
@@ -39,7 +41,7 @@ impl Trace {
         self.steps
     }
 
-    /// A control step: bits of the measurement, then bits of duty, duty_sim, action index, status; of `rest`
+    /// A control step: bits of the measurement, then bits of each duty, of each duty_sim, the action indices, status; of `rest`
     /// (observation, Q values, state afterwards) the checksum alone is kept.
     pub fn step(&mut self, measurement: &[u32], command: &[u32], rest: impl IntoIterator<Item = u32>) {
         self.step_of(kind::STEP, measurement, command, rest);
@@ -59,9 +61,15 @@ impl Trace {
         self.steps += 1;
     }
 
-    /// An attempt to replace the mapping's coefficients.
-    pub fn set_mapping(&mut self, coefficients: &[u32], accepted: u32, state: impl IntoIterator<Item = u32>) {
-        self.open(kind::SET_MAPPING);
+    /// An attempt to replace the coefficients of the mapping of the output of that index.
+    pub fn set_mapping(
+        &mut self,
+        output: usize,
+        coefficients: &[u32],
+        accepted: u32,
+        state: impl IntoIterator<Item = u32>,
+    ) {
+        self.open(mapping_kind(output));
         self.words.extend_from_slice(coefficients);
         self.words.extend([accepted, crc32_words(state)]);
     }
@@ -90,6 +98,11 @@ impl Trace {
     }
 }
 
+/// First word of a move that sets the mapping of the output of that index.
+pub(super) fn mapping_kind(output: usize) -> u32 {
+    kind::SET_MAPPING + kind::OUTPUT * output as u32
+}
+
 #[cfg(test)]
 mod tests {
     use super::Trace;
@@ -101,11 +114,35 @@ mod tests {
         // the check value of the CRC-32 catalogue, over eight digits: 0x9AE0DAAF
         let rest = [u32::from_le_bytes(*b"1234"), u32::from_le_bytes(*b"5678")];
         trace.step(&[7, 8], &[1, 2, 3, 4], rest);
-        trace.set_mapping(&[5, 6, 7], 1, []);
+        trace.set_mapping(0, &[5, 6, 7], 1, []);
+        trace.set_mapping(2, &[5, 6, 7], 0, []);
         assert_eq!(
             trace.words(),
-            [3, 0, 0, 7, 8, 1, 2, 3, 4, 0x9AE0_DAAF, 1, 5, 6, 7, 1, 0]
+            [
+                3,
+                0,
+                0,
+                7,
+                8,
+                1,
+                2,
+                3,
+                4,
+                0x9AE0_DAAF,
+                1,
+                5,
+                6,
+                7,
+                1,
+                0,
+                33,
+                5,
+                6,
+                7,
+                0,
+                0
+            ]
         );
-        assert_eq!((trace.events(), trace.steps()), (3, 1));
+        assert_eq!((trace.events(), trace.steps()), (4, 1));
     }
 }

@@ -7,7 +7,7 @@ use quote::quote;
 use super::tokens::{ident, size};
 use super::{DEFAULT_TYPE, constants, types};
 use super::{integrity, number};
-use crate::program::Program;
+use crate::program::{MappingCode, OutputCode, Program};
 
 /// `<name>_ffi.rs`: `Measurement`, `Command`, `status` and `Controller` as in the Rust backend's file, over the C core.
 ///
@@ -29,7 +29,7 @@ fn items(program: &Program) -> TokenStream {
         words,
         as_words,
     } = state(program);
-    let (declared_mapping, set_mapping) = mapping(program);
+    let (declared_mapping, set_mapping) = mappings(program);
     let core = core(program, &declared_mapping);
     let check = integrity::check(
         program,
@@ -42,6 +42,7 @@ fn items(program: &Program) -> TokenStream {
         },
     );
     let methods = methods(program, &set_mapping);
+    let nothing = nothing(program);
     quote! {
         #constants
         #types
@@ -54,7 +55,7 @@ fn items(program: &Program) -> TokenStream {
         // Every call hands over references or arrays of the lengths in the C header, which the C core reads and writes
         // within these lengths and does not keep.
         impl #name {
-            const NOTHING: Command = Command { duty: 0.0, duty_sim: 0.0, action_index: 0, status: 0 };
+            #nothing
             /// Start-up state.
             #[must_use]
             pub fn new() -> Self {
@@ -220,13 +221,31 @@ fn state(program: &Program) -> State {
     }
 }
 
-/// Declaration and method that set the mapping's coefficients; nothing if the policy has no mapping.
-fn mapping(program: &Program) -> (TokenStream, TokenStream) {
-    let Some(mapping) = program.mapping() else {
-        return (TokenStream::new(), TokenStream::new());
+/// What a command holds before the C core has written it.
+fn nothing(program: &Program) -> TokenStream {
+    let (duty, index) = match program.has_several() {
+        true => (quote!([0.0; OUTPUTS]), quote!([0; OUTPUTS])),
+        false => (quote!(0.0), quote!(0)),
     };
-    let symbol = format!("{}_set_mapping", program.name);
-    let name = ident(DEFAULT_TYPE);
+    quote! {
+        const NOTHING: Command = Command { duty: #duty, duty_sim: #duty, action_index: #index, status: 0 };
+    }
+}
+
+/// Declarations and methods that set coefficients, one for each mapping.
+fn mappings(program: &Program) -> (TokenStream, TokenStream) {
+    let both = program
+        .outputs
+        .iter()
+        .filter_map(|output| Some(set_mapping(program, output, output.mapping.as_ref()?)));
+    let (declarations, methods): (Vec<_>, Vec<_>) = both.unzip();
+    (quote!(#(#declarations)*), quote!(#(#methods)*))
+}
+
+fn set_mapping(program: &Program, output: &OutputCode, mapping: &MappingCode) -> (TokenStream, TokenStream) {
+    let function = output.named("set_mapping");
+    let symbol = format!("{}_{function}", program.name);
+    let (function, name) = (ident(&function), ident(DEFAULT_TYPE));
     let number = number::kind(program.scalar());
     let names: Vec<_> = mapping
         .coefficients
@@ -235,14 +254,14 @@ fn mapping(program: &Program) -> (TokenStream, TokenStream) {
         .collect();
     let declaration = quote! {
         #[link_name = #symbol]
-        pub fn set_mapping(state: *mut #name, #(#names: #number),*) -> u32;
+        pub fn #function(state: *mut #name, #(#names: #number),*) -> u32;
     };
+    let about = super::mapping::about(output);
     let method = quote! {
-        /// Replaces the coefficients of the duty ratio mapping. False, changing nothing, if one is outside its
-        /// interval or the mapping would not increase with the duty.
+        #(#[doc = #about])*
         #[must_use]
-        pub fn set_mapping(&mut self, #(#names: #number),*) -> bool {
-            unsafe { c::set_mapping(self, #(#names),*) == 1 }
+        pub fn #function(&mut self, #(#names: #number),*) -> bool {
+            unsafe { c::#function(self, #(#names),*) == 1 }
         }
     };
     (declaration, method)

@@ -46,16 +46,7 @@ fn method(scalar: Scalar, output: &OutputCode, mapping: &MappingCode) -> TokenSt
         quote!(#name)
     });
     let [function, check_field] = ["set_mapping", "mapping_check"].map(|stem| ident(&output.named(stem)));
-    let of = output
-        .name
-        .as_ref()
-        .map_or(String::new(), |name| format!(" of the output `{name}`"));
-    let about = [
-        format!(
-            " Replaces the coefficients of the duty ratio mapping{of}. False, changing nothing, if one is outside its"
-        ),
-        " interval or the mapping would not increase with the duty.".to_owned(),
-    ];
+    let about = about(output);
     quote! {
         #(#[doc = #about])*
         #[must_use]
@@ -68,6 +59,20 @@ fn method(scalar: Scalar, output: &OutputCode, mapping: &MappingCode) -> TokenSt
             accepted
         }
     }
+}
+
+/// Documentation of a function that sets them.
+pub fn about(output: &OutputCode) -> [String; 2] {
+    let of = output
+        .name
+        .as_ref()
+        .map_or(String::new(), |name| format!(" of the output `{name}`"));
+    [
+        format!(
+            " Replaces the coefficients of the duty ratio mapping{of}. False, changing nothing, if one is outside its"
+        ),
+        " interval or the mapping would not increase with the duty.".to_owned(),
+    ]
 }
 
 /// The methods that compare the coefficients of a mapping with their check word, and their names.

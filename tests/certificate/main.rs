@@ -215,8 +215,8 @@ fn several_outputs_stay_within_the_bounds_of_each() {
     let mut rng = SplitMix::new(5);
     let (mut decided, mut drives) = (0, 0);
     for seed in 700..720 {
-        let folder = tests::several::policy(seed).unwrap();
-        let policy = policy::load_with(&folder.path(), &tests::several::options()).unwrap();
+        let folder = tests::random::several::policy(seed).unwrap();
+        let policy = policy::load_with(&folder.path(), &tests::random::several::options()).unwrap();
         drives += policy.paths().iter().filter(|path| !path.head.is_choice()).count();
         for format in NumericFormat::ALL {
             decided += check(&policy.clone().with_format(format), &mut rng, 10).1;
@@ -230,8 +230,8 @@ fn several_outputs_stay_within_the_bounds_of_each() {
 #[test]
 fn an_output_among_several_has_the_bounds_that_it_has_alone() {
     for seed in 720..730 {
-        let folder = tests::several::policy(seed).unwrap();
-        let policy = policy::load_with(&folder.path(), &tests::several::options()).unwrap();
+        let folder = tests::random::several::policy(seed).unwrap();
+        let policy = policy::load_with(&folder.path(), &tests::random::several::options()).unwrap();
         let certifier = Certifier::new(&policy);
         let bounds = certifier.box_bounds();
         for (path, bound) in policy.paths().iter().zip(&bounds) {
@@ -301,9 +301,9 @@ fn the_examples_features_come_in_pairs_of_opposite_sign() {
 fn the_observation_of_a_controller_lies_where_its_coordinates_say() {
     let mut rng = SplitMix::new(3);
     let one = (600..640).map(|seed| tests::random::policy(seed).unwrap());
-    let several = (740..760).map(|seed| tests::several::policy(seed).unwrap());
+    let several = (740..760).map(|seed| tests::random::several::policy(seed).unwrap());
     for folder in one.chain(several) {
-        let policy = policy::load_with(&folder.path(), &tests::several::options()).unwrap();
+        let policy = policy::load_with(&folder.path(), &tests::random::several::options()).unwrap();
         let certifier = Certifier::new(&policy);
         let domain = Domain::of(&policy, Memory::Free);
         let mut controller = Controller::<f32>::new(&policy);

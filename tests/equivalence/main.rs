@@ -102,7 +102,7 @@ fn assert_proved(policy: &Policy, solver: &Solver) {
 
 fn load(path: &str) -> Policy {
     let path = tests::root().join(path).join("policy.toml");
-    policy::load_with(&path, &tests::several::options()).unwrap_or_else(|faults| panic!("{faults}"))
+    policy::load_with(&path, &tests::random::several::options()).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
 #[test]

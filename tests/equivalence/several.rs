@@ -32,8 +32,8 @@ fn random_policies_with_several_outputs_do_what_their_contracts_say() {
     ];
     let count = if tests::full() { 15 } else { 1 };
     for seed in 940..940 + count {
-        let folder = tests::several::policy(seed).unwrap();
-        let policy = policy::load_with(&folder.path(), &tests::several::options()).unwrap();
+        let folder = tests::random::several::policy(seed).unwrap();
+        let policy = policy::load_with(&folder.path(), &tests::random::several::options()).unwrap();
         assert_proved(&policy.with_format(formats[(seed % 5) as usize]), &solver);
     }
 }

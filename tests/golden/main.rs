@@ -38,7 +38,7 @@ fn case_folders() -> Vec<PathBuf> {
 }
 
 fn case(folder: &Path) -> Case {
-    let policy = policy::load_with(&folder.join("policy.toml"), &tests::several::options());
+    let policy = policy::load_with(&folder.join("policy.toml"), &tests::random::several::options());
     let policy = policy.unwrap_or_else(|faults| panic!("{faults}"));
     Case {
         name: folder.file_name().unwrap().to_string_lossy().into_owned(),

@@ -99,8 +99,8 @@ fn the_kit_of_several_outputs_passes_under_every_compiler() {
 #[test]
 fn the_kit_of_random_policies_with_several_outputs_passes() {
     for seed in 0..if tests::full() { 20 } else { 4 } {
-        let folder = tests::several::policy(seed).unwrap();
-        let policy = policy::load_with(&folder.path(), &tests::several::options()).unwrap();
+        let folder = tests::random::several::policy(seed).unwrap();
+        let policy = policy::load_with(&folder.path(), &tests::random::several::options()).unwrap();
         let ran = run_kit(&policy, &files(&policy, Output::Kit, STEPS), &COMPILERS[0]);
         assert_eq!(ran.code, Some(0), "{}: {ran:?}", folder.contract);
     }

@@ -25,8 +25,8 @@ fn golden_case(name: &str) -> Policy {
 
 /// Three legs in the place of the one duty of that golden case.
 fn legs(case: &str) -> Policy {
-    let folder = tests::several::legs(case).unwrap();
-    policy::load_with(&folder.path(), &tests::several::options()).unwrap_or_else(|faults| panic!("{faults}"))
+    let folder = tests::random::several::legs(case).unwrap();
+    policy::load_with(&folder.path(), &tests::random::several::options()).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
 fn example() -> Policy {

@@ -11,7 +11,7 @@ use prove::{Answer, Claim, Eva, Prover, Stop, Task, Verdict, Watch, eva};
 
 fn load(path: &str) -> Policy {
     let path = tests::root().join(path).join("policy.toml");
-    policy::load_with(&path, &tests::several::options()).unwrap_or_else(|faults| panic!("{faults}"))
+    policy::load_with(&path, &tests::random::several::options()).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
 fn in_format(path: &str, format: NumericFormat) -> Policy {
@@ -105,8 +105,8 @@ fn nothing_goes_wrong_in_random_policies_with_several_outputs() {
     // a minute each where others build
     let count = if tests::full() { 20 } else { 0 };
     for seed in 4300..4300 + count {
-        let folder = tests::several::policy(seed).unwrap();
-        let policy = policy::load_with(&folder.path(), &tests::several::options()).unwrap();
+        let folder = tests::random::several::policy(seed).unwrap();
+        let policy = policy::load_with(&folder.path(), &tests::random::several::options()).unwrap();
         let formats = [
             NumericFormat::F32,
             NumericFormat::I16,

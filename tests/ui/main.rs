@@ -26,11 +26,11 @@ impl Fixture {
         copy_folder(&example, &fixture.path("policy"));
         copy_folder(&example, &fixture.path("../outside"));
         copy_folder(&linear, &fixture.path("linear"));
-        let legs = tests::several::legs("constructs").unwrap();
+        let legs = tests::random::several::legs("constructs").unwrap();
         copy_folder(legs.folder.path(), &fixture.path("legs"));
         std::fs::create_dir(fixture.path("text")).unwrap();
         for contract in [linear.join("policy.toml"), legs.path()] {
-            let policy = policy::load_with(&contract, &tests::several::options()).unwrap();
+            let policy = policy::load_with(&contract, &tests::random::several::options()).unwrap();
             let text = generate(&policy, targets::find("host").unwrap(), &[codegen::Output::Rust]).unwrap();
             let file = format!("{}.rs", policy.name);
             std::fs::write(fixture.path("text").join(&file), &text[&file]).unwrap();

@@ -290,8 +290,13 @@ fn an_edit_where_random_moves_seldom_come_fails() {
         ("(v26, -20.0f, 20.0f)", "(v26, -20.02f, 20.0f)"),
         ("uint32_t next = 1u;", "uint32_t next = 2u;"),
         ("next = vector + 1u;", "next = vector + 2u;"),
-        ("(next == 17u) ?", "(next == 18u) ?"),
-        ("(16u - right)", "(17u - right)"),
+        // a self test that loses count, or whose end does
+        ("next = vector + 1u;", "next = vector - 1u;"),
+        ("(right == 16u) ?", "(right == 15u) ?"),
+        ("(17u - next)", "(18u - next)"),
+        ("++right;", ""),
+        // a number that is never written: whatever the stack holds
+        ("    span.to = BUCK12_ACTIONS;\n", ""),
         ("check->position = span.to;", ""),
         ("? check->position : 0u;", "? check->position : 1u;"),
         // the tables of a sound build have the right checksum: another one has to be brought along

@@ -39,7 +39,7 @@ const DEFECTS: [Defect; 28] = [
     defect("a NaN not caught behind the limiter", (" & ~(uint32_t)(stray >> 31)", ""), "prove_damaged", "damaged-duty"),
     defect("a sum without its number", ("for (i = 1u; i < 12u; ++i)", "for (i = 1u; i < 13u; ++i)"), "prove_q_values", "q-values-runs"),
     defect("a gain above 2 in a low-pass", ("v25 * 0.09090909f", "v25 * 2.5f"), "prove_slices", "slices-slices"),
-    defect("a vector that there is not", ("(16u - right) : next", "(16u - right) : (next + 9u)"), "prove_self_test", "self-test-self_test"),
+    defect("a vector that there is not", (": (right + 1u)", ": (right + 9u)"), "prove_self_test", "self-test-self_test"),
     defect("duty limits too wide", ("constructs_clamp(v16, 0.3f, 0.67999995f)", "constructs_clamp(v16, 0.3f, 0.7f)"), "prove_damaged", "damaged-duty"),
     defect("another fallback", ("constructs_select(usable, v17, 0.02f)", "constructs_select(usable, v17, 0.2f)"), "prove_damaged", "damaged-duty"),
     defect("a status bit without a meaning", ("(f19 << 7)", "(f19 << 9)"), "prove_damaged", "damaged-status"),

@@ -40,6 +40,8 @@ usage: cargo xtask <command>
                                     policies drawn at random, every build against the interpreter (docs/evidence.md; --help)
   fuzz [--seconds N|--executions N] [--target NAME] ...
                                     damaged bytes for every reader (docs/results/fuzzing.md; --help)
+  mutants --seed S [--sample N] ...
+                                    changes to interp, policy and codegen that a test should catch (docs/evidence.md; --help)
   blind --out DIR ...               blind cases for the diagnosis and their score (docs/reference/blind-cases.md; --help)
 ";
 
@@ -58,6 +60,7 @@ enum Command {
     Random(Vec<String>),
     Blind(Vec<String>),
     Fuzz(Vec<String>),
+    Mutants(Vec<String>),
     Bench(Vec<String>),
     Help,
 }
@@ -91,6 +94,7 @@ fn parse(arguments: &[String]) -> Result<Command, String> {
         "blind" => return Ok(Command::Blind(rest.to_vec())),
         "bench" => return Ok(Command::Bench(rest.to_vec())),
         "fuzz" => return Ok(Command::Fuzz(rest.to_vec())),
+        "mutants" => return Ok(Command::Mutants(rest.to_vec())),
         "wheel" => {
             return parse_test(rest).map(|command| match command {
                 Command::Test(options) => Command::Wheel(options),
@@ -173,6 +177,7 @@ fn run(command: Command) -> Result<bool, String> {
         Command::Random(arguments) => random(&Workspace::load()?, &arguments),
         Command::Blind(arguments) => blind(&Workspace::load()?, &arguments),
         Command::Fuzz(arguments) => fuzz(&Workspace::load()?, &arguments),
+        Command::Mutants(arguments) => mutants(&Workspace::load()?, &arguments),
         Command::Bench(arguments) => other_crate(&Workspace::load()?, "bench", &arguments),
     }
 }
@@ -209,6 +214,16 @@ fn fuzz(workspace: &Workspace, arguments: &[String]) -> Result<bool, String> {
     // a profile of its own: as quick as a release, with overflow checks
     let mut command = workspace.cargo(&["run", "--profile", "fuzz", "--quiet", "-p", "fuzz", "--"]);
     let status = command.args(arguments).status();
+    Ok(status.map_err(|error| format!("cargo: {error}"))?.success())
+}
+
+fn mutants(workspace: &Workspace, arguments: &[String]) -> Result<bool, String> {
+    // a crate outside of the workspace, as the firmware is
+    let mut command = workspace.cargo(&["run", "--quiet", "--manifest-path", "tools/mutants/Cargo.toml"]);
+    command
+        .arg("--target-dir")
+        .arg(workspace.target_dir.join("mutants/tool"));
+    let status = command.arg("--").args(arguments).status();
     Ok(status.map_err(|error| format!("cargo: {error}"))?.success())
 }
 

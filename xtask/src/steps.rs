@@ -77,6 +77,9 @@ const fn step(name: &'static str, form: Form, run: fn(&Context) -> Outcome) -> S
 const PAGES: Step = step("pages", Form::Quick, |c| judged(rules::pages(c.workspace)));
 const BOOK: Step = step("book", Form::Quick, book);
 
+/// A crate of its own, with its own lock file.
+const MUTANTS: &str = "tools/mutants";
+
 const STUDIO: Step = step("studio", Form::Usual, build_studio);
 
 /// The page of `policyc studio`.
@@ -123,6 +126,7 @@ pub const ALL: &[Step] = &[
     STUDIO,
     step("test", Form::Quick, test),
     WHEEL,
+    step("mutants", Form::Usual, mutants),
     step("rustdoc", Form::Usual, rustdoc),
     step("firmware", Form::Usual, firmware),
     step("demo", Form::Usual, demo),
@@ -280,9 +284,25 @@ fn book(context: &Context) -> Outcome {
 
 fn fmt(context: &Context) -> Outcome {
     context.cargo(&["fmt", "--all", "--check", "--", "--color", "never"], &[])?;
-    for folder in context.workspace.firmware()? {
+    let mutants = context.workspace.root.join(MUTANTS);
+    for folder in context.workspace.firmware()?.into_iter().chain([mutants]) {
         context.cargo_in(&folder, &["fmt", "--check", "--", "--color", "never"], &[])?;
     }
+    passed()
+}
+
+/// The tool behind `cargo xtask mutants`, which is outside of the workspace.
+fn mutants(context: &Context) -> Outcome {
+    let target_dir = context.workspace.target_dir.join("mutants/tool");
+    let target_dir = target_dir.to_string_lossy();
+    let environment = [("CARGO_TARGET_DIR", target_dir.as_ref())];
+    let folder = context.workspace.root.join(MUTANTS);
+    context.cargo_in(
+        &folder,
+        &["clippy", "--all-targets", "--", "-D", "warnings"],
+        &environment,
+    )?;
+    context.cargo_in(&folder, &["test"], &environment)?;
     passed()
 }
 

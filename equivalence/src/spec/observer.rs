@@ -36,8 +36,8 @@ pub(crate) fn observe(
     let signals = measured.signals;
     let y = signals[observer.output_voltage];
     let o = signals[observer.load_current];
-    // the check of a policy gives observers to one output alone
-    let d = state.outputs[0].previous_command;
+    // section 2b: of several outputs that of the one which the observer names
+    let d = state.outputs[observer.output].previous_command;
     let (u, kept_u) = match observer.input_voltage {
         InputVoltage::Constant(volts) => (spec.nearest(volts), None),
         InputVoltage::Signal(index) => (signals[index], Some(signals[index])),

@@ -218,9 +218,12 @@ fn reads(spec: Spec<'_>, input: Input) -> bool {
     if law.any(|source| in_tree(&source.tree, input)) {
         return true;
     }
-    // every observer is driven by the last command
-    let observed = input == Input::PreviousCommand && !spec.policy.observers.is_empty();
-    observed || features.iter().any(|feature| in_tree(&feature.source, input))
+    // every observer is driven by the last command, of several outputs by that of the one it names
+    let mut drives = spec.policy.observers.iter().map(|observer| match spec.policy.head {
+        Head::Several(_) => Input::OutputCommand(observer.output),
+        _ => Input::PreviousCommand,
+    });
+    drives.any(|drive| drive == input) || features.iter().any(|feature| in_tree(&feature.source, input))
 }
 
 /// Name, value and allowed interval of every coefficient of a mapping; nothing without one.

@@ -20,7 +20,7 @@
 
 #define INPUTS ADC_MAPPING_BLOCK_INPUTS
 #define OUTPUTS 3u
-#define SIGNATURE 0x6774b135u
+#define SIGNATURE 0xd43c301eu
 
 /* Type of each variable; references start at 1: inputs, outputs, parameters. */
 static const char types[ADC_MAPPING_FMU_VARIABLES] = {

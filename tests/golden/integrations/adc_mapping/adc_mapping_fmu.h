@@ -29,7 +29,7 @@
  *   10 r (parameter): coefficient of the duty ratio mapping; set before a step, it counts from the one after it
  */
 #define ADC_MAPPING_FMU_VARIABLES 10u
-#define ADC_MAPPING_FMU_TOKEN "{6774b135-e728-0646-d8af-c975d5578dc9}"
+#define ADC_MAPPING_FMU_TOKEN "{d43c301e-6502-8e72-1e8b-b826f0c69167}"
 #define ADC_MAPPING_FMU_PERIOD 2e-5
 
 /* Types of variables. */

@@ -20,7 +20,7 @@
 
 #define INPUTS MINIMAL_BLOCK_INPUTS
 #define OUTPUTS 3u
-#define SIGNATURE 0x170e8994u
+#define SIGNATURE 0x0aff2dbau
 
 /* Type of each variable; references start at 1: inputs, outputs, parameters. */
 static const char types[MINIMAL_FMU_VARIABLES] = {

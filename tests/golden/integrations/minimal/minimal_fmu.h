@@ -25,7 +25,7 @@
  *   6 status (output): status bits; 65536 is added while the coefficients are refused
  */
 #define MINIMAL_FMU_VARIABLES 6u
-#define MINIMAL_FMU_TOKEN "{170e8994-5fe9-6d31-30c0-a3a26a6ffd1b}"
+#define MINIMAL_FMU_TOKEN "{0aff2dba-9a7e-bc22-9edc-21cc08409bc7}"
 #define MINIMAL_FMU_PERIOD 0.0001
 
 /* Types of variables. */

@@ -1355,5 +1355,5 @@ ACTIVATIONS_COLD uint32_t activations_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

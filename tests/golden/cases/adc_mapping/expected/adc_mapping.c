@@ -979,5 +979,5 @@ ADC_MAPPING_COLD uint32_t adc_mapping_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

@@ -1072,5 +1072,5 @@ CIRCUITS_COLD uint32_t circuits_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

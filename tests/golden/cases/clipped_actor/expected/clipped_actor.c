@@ -768,5 +768,5 @@ CLIPPED_ACTOR_COLD uint32_t clipped_actor_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

@@ -1536,5 +1536,5 @@ CONSTRUCTS_COLD uint32_t constructs_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

@@ -1003,5 +1003,5 @@ CONTINUOUS_COLD uint32_t continuous_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

@@ -1002,5 +1002,5 @@ FILTERS_COLD uint32_t filters_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

@@ -697,5 +697,5 @@ LINEAR_COLD uint32_t linear_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

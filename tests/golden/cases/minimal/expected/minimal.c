@@ -774,5 +774,5 @@ MINIMAL_COLD uint32_t minimal_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

@@ -1067,5 +1067,5 @@ OBSERVED_COLD uint32_t observed_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

@@ -974,5 +974,5 @@ PAPER_COLD uint32_t paper_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

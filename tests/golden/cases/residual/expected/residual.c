@@ -1205,5 +1205,5 @@ RESIDUAL_COLD uint32_t residual_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

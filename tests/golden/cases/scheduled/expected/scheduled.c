@@ -854,5 +854,5 @@ SCHEDULED_COLD uint32_t scheduled_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

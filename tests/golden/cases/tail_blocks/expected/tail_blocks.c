@@ -1006,5 +1006,5 @@ TAIL_BLOCKS_COLD uint32_t tail_blocks_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

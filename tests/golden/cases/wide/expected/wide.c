@@ -1130,5 +1130,5 @@ WIDE_COLD uint32_t wide_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

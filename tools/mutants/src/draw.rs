@@ -1,0 +1,85 @@
+//! All mutants of the three crates, in an order that a seed draws.
+
+use std::path::{Path, PathBuf};
+
+use random::{Random, SplitMix};
+
+use crate::sites::{self, Mutant};
+
+/// Folders of the crates that are changed: what decides the bits of a command.
+pub const CRATES: [&str; 3] = ["interp", "policy", "codegen"];
+
+/// One mutant and where it stands.
+#[derive(Clone, Debug)]
+pub struct Drawn {
+    /// A folder of [`CRATES`].
+    pub krate: &'static str,
+    /// From the root of the workspace.
+    pub file: PathBuf,
+    /// The change itself.
+    pub mutant: Mutant,
+}
+
+impl Drawn {
+    /// Its name in results: place and change.
+    pub fn key(&self) -> String {
+        let (line, column) = self.mutant.place;
+        format!("{}:{line}:{column}: {}", self.file.display(), self.mutant.text)
+    }
+}
+
+/// What the crates hold.
+#[derive(Debug, Default)]
+pub struct Population {
+    /// For each crate its mutants, in the order in which they are drawn.
+    pub mutants: Vec<Vec<Drawn>>,
+    /// See [`sites::Found`].
+    pub constant: usize,
+    /// See [`sites::Found`].
+    pub macros: usize,
+}
+
+/// Reads the sources below `root`.
+///
+/// # Errors
+/// A source that cannot be read or is no Rust.
+pub fn population(root: &Path, seed: u64) -> Result<Population, String> {
+    let mut all = Population::default();
+    for krate in CRATES {
+        let mut mutants = Vec::new();
+        for file in sources(&root.join(krate).join("src"))? {
+            let text = std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+            let found = sites::find(&text).map_err(|error| format!("{}: {error}", file.display()))?;
+            all.constant += found.constant;
+            all.macros += found.macros;
+            let file = file.strip_prefix(root).unwrap_or(&file).to_owned();
+            mutants.extend(found.mutants.into_iter().map(|mutant| Drawn {
+                krate,
+                file: file.clone(),
+                mutant,
+            }));
+        }
+        // Fisher and Yates; a crate's order does not depend on what the others hold
+        let mut random = SplitMix::new(seed);
+        for last in (1..mutants.len()).rev() {
+            mutants.swap(last, random.below(last + 1));
+        }
+        all.mutants.push(mutants);
+    }
+    Ok(all)
+}
+
+fn sources(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let entries = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    paths.sort();
+    let mut files = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            files.extend(sources(&path)?);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path);
+        }
+    }
+    Ok(files)
+}

@@ -1,0 +1,295 @@
+//! Changes to interp, policy and codegen, and whether a test notices.
+//!
+//! ```text
+//! sources ─► draw by a seed ─► one copy of the workspace, each mutant behind a switch ─► one build ─► each program, no
+//! mutant on: which switches are asked ─► each mutant: the programs that ask it, the quickest first, until one fails
+//! ```
+//!
+//! A tool that builds anew for each mutant takes a minute or more for each, on two cores.
+
+mod changes;
+mod copy;
+mod draw;
+mod instrument;
+mod programs;
+mod results;
+mod run;
+mod sites;
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use draw::{Drawn, Population};
+use programs::{Build, Built, Program};
+use results::Results;
+use run::{End, Switched};
+
+const USAGE: &str = "\
+usage: cargo xtask mutants --seed S [--sample N] [--again] [--table]
+
+  --seed S     which mutants are drawn
+  --sample N   so many of each of interp, policy and codegen (50)
+  --again      those that no test caught once more: a test may be new
+  --table      only what is known, nothing is run
+
+Results are in target/mutants/S.jsonl; a run that was stopped goes on. What changes nothing is listed in tools/mutants/equal.md.
+";
+
+/// A program may take this many times as long as without a mutant, and [`GRACE`] beside it: the machine may be busy.
+const PATIENCE: u32 = 10;
+const GRACE: Duration = Duration::from_secs(30);
+/// A program that takes longer than this without a mutant does not end.
+const LONGEST: Duration = Duration::from_secs(900);
+
+#[derive(Debug, Default)]
+struct Options {
+    seed: u64,
+    sample: usize,
+    again: bool,
+    table: bool,
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let options = match parse(&arguments) {
+        Ok(options) => options,
+        Err(message) => {
+            eprint!("error: {message}\n\n{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match Folders::here().and_then(|folders| work(&options, &folders)) {
+        Ok(table) => {
+            print!("{table}");
+            ExitCode::SUCCESS
+        }
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn parse(arguments: &[String]) -> Result<Options, String> {
+    let mut options = Options {
+        sample: 50,
+        ..Options::default()
+    };
+    let mut seed = None;
+    let mut words = arguments.iter();
+    while let Some(word) = words.next() {
+        let mut number = || {
+            let text = words.next().ok_or_else(|| format!("`{word}` takes a number"))?;
+            text.parse::<u64>()
+                .map_err(|_| format!("`{word}` takes a number, found `{text}`"))
+        };
+        match word.as_str() {
+            "--seed" => seed = Some(number()?),
+            "--sample" => options.sample = usize::try_from(number()?).unwrap_or(usize::MAX),
+            "--again" => options.again = true,
+            "--table" => options.table = true,
+            _ => return Err(format!("unknown option `{word}`")),
+        }
+    }
+    options.seed = seed.ok_or("`--seed` is missing")?;
+    Ok(options)
+}
+
+/// Where things are.
+struct Folders {
+    root: PathBuf,
+    copy: PathBuf,
+    build: PathBuf,
+    out: PathBuf,
+}
+
+impl Folders {
+    fn here() -> Result<Self, String> {
+        let root = std::env::current_dir().map_err(|error| error.to_string())?;
+        if !root.join("interp/src").is_dir() {
+            return Err("start it in the root of the workspace, or by `cargo xtask mutants`".into());
+        }
+        let out = root.join("target/mutants");
+        std::fs::create_dir_all(&out).map_err(|error| format!("{}: {error}", out.display()))?;
+        Ok(Folders {
+            copy: out.join("workspace"),
+            build: out.join("build"),
+            out,
+            root,
+        })
+    }
+}
+
+fn work(options: &Options, folders: &Folders) -> Result<String, String> {
+    let population = draw::population(&folders.root, options.seed)?;
+    let mut results = Results::open(&folders.out.join(format!("{}.jsonl", options.seed)))?;
+    let equal = std::fs::read_to_string(folders.root.join("tools/mutants/equal.md")).unwrap_or_default();
+    let equal = results::judged(&equal);
+    say(&format!(
+        "{} places, and {} that are evaluated while it compiles; {} calls of macros are not looked into",
+        population.mutants.iter().map(Vec::len).sum::<usize>(),
+        population.constant,
+        population.macros
+    ));
+    if options.table {
+        return Ok(results.table(&sample(&population, &results, options.sample), &equal));
+    }
+    let (built, programs) = build(options, folders, &population, &mut results)?;
+    let asked = measured(&programs, folders, built.len())?;
+    let sample = sample(&population, &results, options.sample);
+    for key in sample.iter().map(Drawn::key) {
+        let Some(number) = built.iter().position(|drawn| drawn.key() == key) else {
+            return Err(format!("{key} was not built"));
+        };
+        let is_known = match results.of(&key) {
+            Some("passed" | "not reached") => !options.again,
+            other => other.is_some(),
+        };
+        if !is_known {
+            try_one(number, &key, &asked, &mut results)?;
+        }
+    }
+    Ok(results.table(&sample, &equal))
+}
+
+/// The first of each crate in the order of the seed, without those that do not compile.
+fn sample(population: &Population, results: &Results, count: usize) -> Vec<Drawn> {
+    let compiles = |drawn: &&Drawn| results.of(&drawn.key()) != Some("does not compile");
+    let crates = population.mutants.iter();
+    crates
+        .flat_map(|mutants| mutants.iter().filter(compiles).take(count).cloned())
+        .collect()
+}
+
+/// Builds, without those that do not compile. Some more mutants than are wanted are in it, which take their places: to build
+/// without them at the end would build everything twice.
+fn build(
+    options: &Options,
+    folders: &Folders,
+    population: &Population,
+    results: &mut Results,
+) -> Result<(Vec<Drawn>, Vec<Program>), String> {
+    let spare = options.sample / 3 + 5;
+    loop {
+        let mutants = sample(population, results, options.sample + spare);
+        let placed = copy::refresh(&folders.root, &folders.copy, &mutants)?;
+        let cargo = Build {
+            root: &folders.copy,
+            target: &folders.build,
+        };
+        match cargo.programs(&placed)? {
+            Built::Programs(programs) => return Ok((mutants, programs)),
+            Built::Without(bad) => {
+                say(&format!("{} of {} do not compile", bad.len(), mutants.len()));
+                for number in bad {
+                    results.add(&mutants[number].key(), "does not compile", "", 0.0)?;
+                }
+            }
+        }
+    }
+}
+
+/// A program, how long it takes, and the mutants whose switch it asks.
+struct Asked {
+    program: Program,
+    seconds: Duration,
+    mutants: BTreeSet<usize>,
+}
+
+/// Runs each program without a mutant. The quickest comes first.
+fn measured(programs: &[Program], folders: &Folders, count: usize) -> Result<Vec<Asked>, String> {
+    let file = folders.out.join("asked");
+    let kept = folders.out.join("programs");
+    std::fs::create_dir_all(&kept).map_err(|error| format!("{}: {error}", kept.display()))?;
+    let mut all = Vec::new();
+    for program in programs {
+        // another build takes nothing away from a run that takes an hour
+        let path = kept.join(program.path.file_name().unwrap_or_default());
+        std::fs::copy(&program.path, &path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let program = &Program {
+            path,
+            ..program.clone()
+        };
+        let _ = std::fs::remove_file(&file);
+        let (end, seconds) = run::run(program, Switched::Asked(&file), LONGEST)?;
+        let text = std::fs::read_to_string(&file).unwrap_or_default();
+        let mutants: BTreeSet<usize> = text.lines().filter_map(|line| line.parse().ok()).collect();
+        let reached = mutants.iter().filter(|number| **number < count).count();
+        say(&format!(
+            "{}: {:.1} s, {reached} mutants, {end:?}",
+            program.name,
+            seconds.as_secs_f64()
+        ));
+        if end != End::Passed {
+            return Err(format!(
+                "{} fails without a mutant: {} {}",
+                program.name,
+                program.path.display(),
+                program.arguments.join(" ")
+            ));
+        }
+        all.push(Asked {
+            program: program.clone(),
+            seconds,
+            mutants,
+        });
+    }
+    all.sort_by_key(|asked| asked.seconds);
+    Ok(all)
+}
+
+fn try_one(number: usize, key: &str, programs: &[Asked], results: &mut Results) -> Result<(), String> {
+    let mut total = 0.0;
+    let mut last = ("not reached", "");
+    for asked in programs.iter().filter(|asked| asked.mutants.contains(&number)) {
+        let limit = asked.seconds * PATIENCE + GRACE;
+        let (end, seconds) = run::run(&asked.program, Switched::On(number), limit)?;
+        total += seconds.as_secs_f64();
+        last = match end {
+            End::Passed => ("passed", ""),
+            End::Failed => ("failed", asked.program.name.as_str()),
+            End::Hung => ("hung", asked.program.name.as_str()),
+            End::Grew => ("grew", asked.program.name.as_str()),
+        };
+        if end != End::Passed {
+            break;
+        }
+    }
+    say(&format!("{}: {key} {} ({total:.1} s)", last.0, last.1));
+    results.add(key, last.0, last.1, total)
+}
+
+/// Progress goes to standard error: the table alone is the result.
+fn say(line: &str) {
+    eprintln!("{line}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_seed_is_asked_for_and_numbers_are_read() {
+        let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        let options = parse(&words("--seed 7 --sample 20 --again")).unwrap();
+        assert_eq!((options.seed, options.sample, options.again), (7, 20, true));
+        assert!(parse(&words("--sample 3")).unwrap_err().contains("--seed"));
+        assert!(parse(&words("--seed x")).unwrap_err().contains("`x`"));
+        assert!(parse(&words("--sede 1")).unwrap_err().contains("`--sede`"));
+    }
+
+    /// The same seed draws the same mutants, another one others; and there are thousands to draw from.
+    #[test]
+    fn a_seed_draws_the_same_mutants_again() {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let first = |seed| -> Vec<String> {
+            let population = draw::population(&root, seed).unwrap();
+            assert!(population.mutants.iter().all(|mutants| mutants.len() > 300));
+            population.mutants.iter().map(|mutants| mutants[0].key()).collect()
+        };
+        assert_eq!(first(1), first(1));
+        assert_ne!(first(1), first(2));
+    }
+}

@@ -1,0 +1,117 @@
+//! Results as JSON lines, so that a run that was stopped goes on; and the table made of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::draw::{CRATES, Drawn};
+
+/// What is known of each mutant, by its name.
+#[derive(Debug)]
+pub struct Results {
+    path: PathBuf,
+    found: BTreeMap<String, Value>,
+}
+
+/// Caught, whether by a failing test or by a limit.
+const CAUGHT: [&str; 3] = ["failed", "hung", "grew"];
+
+impl Results {
+    /// Those of an earlier run, if the file is there.
+    ///
+    /// # Errors
+    /// A line that is no result.
+    pub fn open(path: &Path) -> Result<Self, String> {
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        let mut found = BTreeMap::new();
+        for (number, line) in text.lines().enumerate() {
+            let value: Value =
+                serde_json::from_str(line).map_err(|error| format!("{}:{}: {error}", path.display(), number + 1))?;
+            // the last word counts
+            found.insert(value["mutant"].as_str().unwrap_or_default().to_owned(), value);
+        }
+        Ok(Results {
+            path: path.to_owned(),
+            found,
+        })
+    }
+
+    /// How it ended, by its name.
+    pub fn of(&self, key: &str) -> Option<&str> {
+        self.found.get(key)?["result"].as_str()
+    }
+
+    /// Adds a line.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn add(&mut self, key: &str, result: &str, by: &str, seconds: f64) -> Result<(), String> {
+        let value = json!({ "mutant": key, "result": result, "by": by, "seconds": (seconds * 10.0).round() / 10.0 });
+        let mut file = std::fs::OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(&self.path)
+            .map_err(|error| format!("{}: {error}", self.path.display()))?;
+        writeln!(file, "{value}").map_err(|error| format!("{}: {error}", self.path.display()))?;
+        self.found.insert(key.to_owned(), value);
+        Ok(())
+    }
+
+    /// Counts for each crate, and the mutants that no test caught; `equal` are those that a person judged to change nothing.
+    pub fn table(&self, sample: &[Drawn], equal: &BTreeSet<String>) -> String {
+        let mut text = String::from(
+            "| crate | mutants | caught | change nothing | missed | caught of those that change something |\n",
+        );
+        text.push_str("|---|---:|---:|---:|---:|---:|\n");
+        let mut left = String::new();
+        for krate in CRATES {
+            let own: Vec<&Drawn> = sample.iter().filter(|drawn| drawn.krate == krate).collect();
+            let (mut caught, mut same, mut missed) = (0, 0, 0);
+            for key in own.iter().map(|drawn| drawn.key()) {
+                match self.of(&key) {
+                    Some(result) if CAUGHT.contains(&result) => caught += 1,
+                    Some(_) if equal.contains(&unplaced(&key)) => same += 1,
+                    Some(result) => {
+                        missed += 1;
+                        left.push_str(&format!("{result}: {key}\n"));
+                    }
+                    None => left.push_str(&format!("not run: {key}\n")),
+                }
+            }
+            let share = 100.0 * f64::from(caught) / f64::from(caught + missed).max(1.0);
+            let count = own.len();
+            text.push_str(&format!(
+                "| `{krate}` | {count} | {caught} | {same} | {missed} | {share:.1} % |\n"
+            ));
+        }
+        text + "\n" + &left
+    }
+}
+
+/// A name without line and column, which edits elsewhere move.
+fn unplaced(key: &str) -> String {
+    let mut parts = key.splitn(4, ':');
+    let file = parts.next().unwrap_or_default();
+    format!("{file}:{}", parts.nth(2).unwrap_or_default())
+}
+
+/// The list of those that change nothing: in each line that begins with `- ` a name in backticks, and why.
+pub fn judged(text: &str) -> BTreeSet<String> {
+    let lines = text.lines().filter_map(|line| line.strip_prefix("- ``"));
+    lines
+        .filter_map(|line| Some(line.split_once("``")?.0.trim().to_owned()))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_judged_mutant_is_known_wherever_its_line_went() {
+        let list = judged("# x\n- ``a/b.rs: < becomes <= in `a::b < c` `` both ends are excluded before\n");
+        assert!(list.contains(&unplaced("a/b.rs:10:4: < becomes <= in `a::b < c`")));
+    }
+}

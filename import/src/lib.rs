@@ -388,7 +388,13 @@ fn open() -> DraftFeature {
 /// A clip for each bounded observation.
 fn of_bounds(bounds: &[(f64, f64)]) -> Vec<DraftFeature> {
     let feature = |bound: &(f64, f64)| DraftFeature {
-        clip: is_range(bound).then(|| (bound.0, bound.1, "bounds of the observation space".to_owned())),
+        clip: is_range(bound).then(|| {
+            (
+                bound.0,
+                bound.1,
+                "bounds of the observation space; check that the training clips there".to_owned(),
+            )
+        }),
         ..DraftFeature::default()
     };
     bounds.iter().map(feature).collect()

@@ -87,7 +87,7 @@ pub(crate) fn one_output(names: &[&str]) -> Message {
         .found(format!("outputs {}", names.join(", ")))
         .expected("a contract with one output")
         .hint(
-            "`compile`, `inspect`, `verify`, `simulate`, `replay` and the macro take several; `policyc new MODEL --output N` writes a contract for one of them",
+            "training has one duty, and so have the environments of the wheel; `policyc new MODEL --output N` writes a contract for one of them",
         )
 }
 

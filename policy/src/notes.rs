@@ -9,8 +9,8 @@ pub fn left_out(golden: &Golden) -> Option<String> {
     let (outside, all) = (golden.outside, golden.count + golden.outside);
     (outside > 0).then(|| {
         format!(
-            "{outside} of {all} golden observations are left out, as golden_outside allows: where the training made them, this controller \
-             holds the last sample and then commands the fallback"
+            "{outside} of {all} golden observations are left out, as golden_outside allows: no state of this controller gives them. Where they \
+             were measured, and not drawn, it holds the last sample there and then commands the fallback"
         )
     })
 }

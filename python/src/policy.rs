@@ -143,14 +143,6 @@ impl NativePolicy {
         boxes: u32,
         seed: u64,
     ) -> PyResult<(BTreeMap<String, String>, String)> {
-        let names = self.policy.output_names();
-        if !names.is_empty() {
-            let message = Message::new("a certificate is of one duty, and this contract has several outputs");
-            let message = message.found(format!("outputs {}", names.join(", ")));
-            return Err(raise(
-                message.hint("`policyc new MODEL --output N` writes a contract for one of them"),
-            ));
-        }
         let request = CertifyRequest {
             axis,
             at,

@@ -249,6 +249,23 @@ fn replay_refuses_a_log_that_it_cannot_compare() {
     desk.refuse("replay buck12 log.csv", &["zero"]);
 }
 
+#[test]
+fn a_column_that_looks_like_a_duty_is_proposed_and_compared() {
+    let desk = desk(&environment());
+    let log = desk.read("log.csv");
+    let mut lines = log.lines();
+    let header = format!("{},duty_before", lines.next().unwrap());
+    let rows = lines.map(|line| format!("{line},0.5"));
+    let text: Vec<String> = [header].into_iter().chain(rows).collect();
+    desk.write("log.csv", &(text.join("\n") + "\n"));
+    let ran = desk.type_in("replay buck12 log.csv");
+    assert!(ran.stderr.contains("--map previous_duty=duty_before"), "{}", ran.stderr);
+    // the same duty before every sample is none of this policy
+    let ran = desk.type_in("replay buck12 log.csv --map previous_duty=duty_before");
+    assert_eq!(ran.code, Some(1), "{}", ran.stdout);
+    assert!(ran.stdout.contains("duties"), "{}", ran.stdout);
+}
+
 /// A sensor that ends below what the training reached is no feature that is wrong, and the golden vectors do not stand in the way.
 #[test]
 fn replay_tells_a_signal_that_leaves_its_range_from_a_wrong_feature() {
@@ -268,6 +285,7 @@ fn replay_tells_a_signal_that_leaves_its_range_from_a_wrong_feature() {
         said.contains("v_out: ") && said.contains("outside its range in"),
         "{said}"
     );
+    assert!(said.contains("; but in at least "), "{said}");
     let share = stderr
         .split("golden_outside = ")
         .nth(1)

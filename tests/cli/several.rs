@@ -285,11 +285,6 @@ fn the_duty_before_of_an_output_is_that_of_its_own_column() {
 #[test]
 fn what_knows_one_duty_says_what_to_do() {
     let desk = desk();
-    let rest = "several outputs, and one duty is taken here";
-    desk.refuse(
-        "certify two --out c",
-        &[rest, "outputs left, right", "policyc new MODEL --output N"],
-    );
     let example = tests::root().join("examples/train/paper12.toml");
     let lines = std::fs::read_to_string(example).unwrap();
     let here = |line: &str| match line.split(' ').next() {

@@ -76,10 +76,12 @@ fn read(command: &Command) -> Result<(), Failure> {
         Command::Simulate(options) => simulate::check(options),
         Command::Diagnose(options) => diagnose::check(options),
         Command::Verify(options) => verify::check(options),
-        Command::Certify(options) => commands::load_as(&options.policy, options.outside, options.format).map(|_| ()),
+        Command::Certify(options) => {
+            commands::load_several_as(&options.policy, options.outside, options.format).map(|_| ())
+        }
         Command::Prove(options) => {
             let format = options.format.first().copied();
-            commands::load_as(&options.policy, options.outside, format).map(|_| ())
+            commands::load_several_as(&options.policy, options.outside, format).map(|_| ())
         }
         // no task is one of the others
         _ => Ok(()),

@@ -77,15 +77,6 @@ fn options(outside: Outside) -> ReadOptions {
     }
 }
 
-/// [`load`], in another numeric format if one is asked for.
-pub fn load_as(path: &Path, outside: Outside, format: Option<NumericFormat>) -> Result<Policy, Failure> {
-    let policy = load(path, outside)?;
-    Ok(match format {
-        Some(format) => policy.with_format(format),
-        None => policy,
-    })
-}
-
 /// Refuses a share of decisions for a policy that has none.
 fn no_choices(policy: &Policy, golden_decisions: Option<f64>) -> Result<(), Failure> {
     if golden_decisions.is_none() || policy.head.is_choice() {

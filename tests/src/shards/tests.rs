@@ -107,7 +107,7 @@ fn a_policy_that_is_not_equal_is_counted() {
 
 #[test]
 fn a_policy_is_compared_with_its_turns_compiler() {
-    let row = compare(1002, 20);
+    let row = compare(Family::One, 1002, 20);
     assert_eq!((row.compiler.as_str(), row.format.as_str()), ("gcc", "f32-fma"));
     assert!(row.is_equal() && row.builds >= 3, "{row}");
 }

@@ -212,9 +212,12 @@ fn pairs(of: Logged<'_>) -> Option<(String, bool, Vec<Pair>)> {
 }
 
 impl DutyResult {
-    /// What is to be said of other duties.
+    /// What is to be said of the duties; nothing of equal ones that were worked out, since a feature says it.
     pub(super) fn text(&self) -> Option<String> {
-        let first = self.first_line?;
+        let Some(first) = self.first_line else {
+            let is_said = self.rows > 0 && !self.derived;
+            return is_said.then(|| format!("duty of the action equal in {} of {}", self.equal, self.rows));
+        };
         let (others, rows) = (self.rows - self.equal, self.rows);
         let seen: Vec<(usize, f64)> = (self.logged.iter().enumerate())
             .filter_map(|(action, duty)| Some((action, (*duty)?)))

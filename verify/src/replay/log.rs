@@ -111,7 +111,8 @@ impl Log {
         let done = policy.paths().into_iter().zip(&names).zip(columns);
         let done = done.map(|((path, names), columns)| of_output(&path, names, columns, &sheet, &located));
         let done = done.collect::<Result<_, _>>()?;
-        let notes = located.notes(&sheet, &[]);
+        let mut notes = located.notes(&sheet, &[]);
+        notes.extend(unread_duty(&sheet, &located, &names));
         Ok(Self {
             samples,
             begins,
@@ -206,6 +207,24 @@ impl Log {
 pub(super) fn done_names(policy: &Policy) -> Vec<[String; 3]> {
     let named = |path: &DutyPath<'_>| ["action", "duty", "previous_duty"].map(|stem| path.named(stem));
     policy.paths().iter().map(named).collect()
+}
+
+/// A duty that nobody reads, and what a map would make of it: an index alone says nothing of the duties that the actions mean.
+fn unread_duty(sheet: &Sheet, located: &Located, names: &[[String; 3]]) -> Option<String> {
+    let [_, duty, previous] = names.first()?;
+    let is_read = |name: &String| located.signal(name).is_some();
+    let one_output = names.len() == 1 && !is_read(duty) && !is_read(previous);
+    let columns = located.unused.iter().filter_map(|index| sheet.columns().get(*index));
+    let alike = columns.map(|column| column.name.as_str()).find(|name| {
+        let name = name.to_ascii_lowercase();
+        one_output && (name.contains("duty") || name.contains("pwm"))
+    });
+    alike.map(|name| {
+        format!(
+            "`{name}` looks like a duty: with --map {previous}={name} where it is the duty before the sample, or --map {duty}={name} where it \
+             follows from it, the duties that the actions mean are compared, too"
+        )
+    })
 }
 
 /// Columns that say what the trainer did, beside samples and observations.

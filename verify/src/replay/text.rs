@@ -229,7 +229,6 @@ fn is_still(compared: &Compared) -> bool {
 
 fn verdict(policy: &Policy, replay: &Replay) -> String {
     let compared = replay.compared().count();
-    let of = replay.features.len();
     if let Some(late) = &replay.late {
         return format!("DIFFERENT: `{late}` is logged one row late, and nothing else differs");
     }
@@ -238,6 +237,22 @@ fn verdict(policy: &Policy, replay: &Replay) -> String {
         return different(replay, &kind);
     }
     let has_commands = replay.commands().iter().any(|output| output.actions.is_some());
+    equal(replay, &kind, compared, has_commands) + &beyond_ranges(replay)
+}
+
+/// What the verdict does not hold for: the log was replayed as it is, and the controller believes no such sample.
+fn beyond_ranges(replay: &Replay) -> String {
+    match replay.outside.iter().map(|(_, rows, _)| *rows).max() {
+        Some(rows) if rows > 0 => format!(
+            "; but in at least {} a signal is outside its range, where the controller holds and falls back",
+            counted(rows, "row")
+        ),
+        _ => String::new(),
+    }
+}
+
+fn equal(replay: &Replay, kind: &Kind, compared: usize, has_commands: bool) -> String {
+    let of = replay.features.len();
     match (compared, has_commands) {
         (0, false) => "NOTHING COMPARED: the log has no observations and no actions".to_owned(),
         (0, true) => format!("equal: the {} (the log has no observations)", kind.noun),

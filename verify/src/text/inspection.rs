@@ -29,7 +29,7 @@ fn golden(policy: &Policy) -> Vec<String> {
     let Some(golden) = golden_result(policy) else {
         return vec![UNPROVEN.to_owned()];
     };
-    let mut lines = vec![format!("{} golden vectors from the trainer: {golden}", golden.vectors)];
+    let mut lines = vec![format!("{} golden vectors: {golden}", golden.vectors)];
     if let Some(found) = interp::decisions::decisions(policy, None) {
         lines.extend(decisions(policy, &found));
     }

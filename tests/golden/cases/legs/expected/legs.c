@@ -1146,5 +1146,5 @@ LEGS_COLD uint32_t legs_self_test(void)
             ++right;
         }
     }
-    return (next == 17u) ? (16u - right) : next;
+    return (right == 16u) ? (17u - next) : (right + 1u);
 }

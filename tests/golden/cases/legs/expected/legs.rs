@@ -942,7 +942,11 @@ impl Controller {
                 right = right.wrapping_add(1);
             }
         }
-        let failing = if next == 17u32 { 16u32.wrapping_sub(right) } else { next };
+        let failing = if right == 16u32 {
+            17u32.wrapping_sub(next)
+        } else {
+            right.wrapping_add(1)
+        };
         if failing == 0 { Ok(()) } else { Err(failing) }
     }
     /// CRC-32 over the tables: whether they are as generated.

@@ -254,14 +254,14 @@ fn a_column_that_looks_like_a_duty_is_proposed_and_compared() {
     let desk = desk(&environment());
     let log = desk.read("log.csv");
     let mut lines = log.lines();
-    let header = format!("{},duty_before", lines.next().unwrap());
-    let rows = lines.map(|line| format!("{line},0.5"));
+    let header = format!("{},action,duty_before", lines.next().unwrap());
+    let rows = lines.map(|line| format!("{line},0,0.5"));
     let text: Vec<String> = [header].into_iter().chain(rows).collect();
     desk.write("log.csv", &(text.join("\n") + "\n"));
-    let ran = desk.type_in("replay buck12 log.csv");
+    let ran = desk.type_in("replay buck12 log.csv --exploring");
     assert!(ran.stderr.contains("--map previous_duty=duty_before"), "{}", ran.stderr);
-    // the same duty before every sample is none of this policy
-    let ran = desk.type_in("replay buck12 log.csv --map previous_duty=duty_before");
+    // action 0 commands .44
+    let ran = desk.type_in("replay buck12 log.csv --exploring --map previous_duty=duty_before");
     assert_eq!(ran.code, Some(1), "{}", ran.stdout);
     assert!(ran.stdout.contains("duties"), "{}", ran.stdout);
 }

@@ -211,9 +211,9 @@ pub(super) fn done_names(policy: &Policy) -> Vec<[String; 3]> {
 
 /// A duty that nobody reads, and what a map would make of it: an index alone says nothing of the duties that the actions mean.
 fn unread_duty(sheet: &Sheet, located: &Located, names: &[[String; 3]]) -> Option<String> {
-    let [_, duty, previous] = names.first()?;
+    let [action, duty, previous] = names.first()?;
     let is_read = |name: &String| located.signal(name).is_some();
-    let one_output = names.len() == 1 && !is_read(duty) && !is_read(previous);
+    let one_output = names.len() == 1 && is_read(action) && !is_read(duty) && !is_read(previous);
     let columns = located.unused.iter().filter_map(|index| sheet.columns().get(*index));
     let alike = columns.map(|column| column.name.as_str()).find(|name| {
         let name = name.to_ascii_lowercase();

@@ -261,7 +261,7 @@ fn the_duty_before_of_an_output_is_that_of_its_own_column() {
     );
     let with = |right: f64| {
         log(&desk, "action_left,duty_right,obs_dv_dt", |row, left| {
-            let duty = |row: usize| 0.44 + 0.01 * left[row] as f64 - if row % 2 == 0 { 0.25 } else { right };
+            let duty = |row: usize| 0.44 + 0.01 * left[row] as f64 - if row.is_multiple_of(2) { 0.25 } else { right };
             // both begin with 0.5
             let before = if row == 0 { 0.0 } else { duty(row - 1) };
             format!(

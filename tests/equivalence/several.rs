@@ -4,18 +4,19 @@ use policy::NumericFormat;
 
 use super::{Code, assert_proved, load, solver};
 
+const FORMATS: [NumericFormat; 5] = [
+    NumericFormat::F32,
+    NumericFormat::I16,
+    NumericFormat::F64,
+    NumericFormat::I8,
+    NumericFormat::F32Fma,
+];
+
 #[test]
 fn both_legs_do_what_their_contract_says() {
     let Some(solver) = solver() else { return };
-    let formats = [
-        NumericFormat::F32,
-        NumericFormat::I16,
-        NumericFormat::F64,
-        NumericFormat::I8,
-        NumericFormat::F32Fma,
-    ];
-    let count = if tests::full() { formats.len() } else { 2 };
-    for format in &formats[..count] {
+    let count = if tests::full() { FORMATS.len() } else { 2 };
+    for format in &FORMATS[..count] {
         assert_proved(&load("tests/fixtures/legs").with_format(*format), &solver);
     }
 }
@@ -23,18 +24,11 @@ fn both_legs_do_what_their_contract_says() {
 #[test]
 fn random_policies_with_several_outputs_do_what_their_contracts_say() {
     let Some(solver) = solver() else { return };
-    let formats = [
-        NumericFormat::F32,
-        NumericFormat::I16,
-        NumericFormat::F64,
-        NumericFormat::I8,
-        NumericFormat::F32Fma,
-    ];
     let count = if tests::full() { 15 } else { 1 };
     for seed in 940..940 + count {
         let folder = tests::random::several::policy(seed).unwrap();
         let policy = policy::load_with(&folder.path(), &tests::random::several::options()).unwrap();
-        assert_proved(&policy.with_format(formats[(seed % 5) as usize]), &solver);
+        assert_proved(&policy.with_format(FORMATS[(seed % 5) as usize]), &solver);
     }
 }
 

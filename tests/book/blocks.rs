@@ -39,6 +39,7 @@ pub fn continues(page: &str) -> Option<&str> {
 pub fn read(page: &str) -> Result<Vec<Block>, Vec<String>> {
     let (mut blocks, mut faults) = (Vec::new(), Vec::new());
     let mut open: Option<(usize, Option<String>, String)> = None;
+    let mut left_out: Option<String> = None;
     for (event, range) in Parser::new_ext(page, pulldown_cmark::Options::ENABLE_TABLES).into_offset_iter() {
         match event {
             Event::Start(Tag::CodeBlock(kind)) => {
@@ -53,6 +54,10 @@ pub fn read(page: &str) -> Result<Vec<Block>, Vec<String>> {
                     String::new(),
                 ));
             }
+            // a comment that a reader does not see, directly before its block
+            Event::Html(comment) => left_out = reason(&comment),
+            Event::Start(Tag::HtmlBlock) | Event::End(TagEnd::HtmlBlock) => {}
+            Event::Start(_) => left_out = None,
             Event::Text(part) => {
                 if let Some((_, _, text)) = &mut open {
                     text.push_str(&part);
@@ -62,7 +67,7 @@ pub fn read(page: &str) -> Result<Vec<Block>, Vec<String>> {
                 let Some((line, info, text)) = open.take() else {
                     continue;
                 };
-                match block(line, info.as_deref().unwrap_or_default(), text) {
+                match block(line, info.as_deref().unwrap_or_default(), text, left_out.take()) {
                     Ok(found) => blocks.extend(found),
                     Err(fault) => faults.push(format!("{line}: {fault}")),
                 }
@@ -80,17 +85,24 @@ pub fn read(page: &str) -> Result<Vec<Block>, Vec<String>> {
     if faults.is_empty() { Ok(blocks) } else { Err(faults) }
 }
 
-fn block(line: usize, info: &str, text: String) -> Result<Option<Block>, String> {
+/// The reason in `<!-- not tested: REASON -->`.
+fn reason(comment: &str) -> Option<String> {
+    let rest = comment.trim().strip_prefix("<!-- not tested:")?;
+    rest.strip_suffix("-->").map(|reason| reason.trim().to_owned())
+}
+
+fn block(line: usize, info: &str, text: String, left_out: Option<String>) -> Result<Option<Block>, String> {
     let mut words = info.split(',').map(str::trim);
     let language = words.next().unwrap_or_default();
     let attributes: Vec<&str> = words.collect();
     let first = text.lines().next().unwrap_or_default();
     let remark = |key: &str| first.strip_prefix(key).map(|rest| rest.trim().to_owned());
     let kind = match (language, attributes.as_slice()) {
-        ("sh", []) => match remark("# not tested:") {
-            Some(reason) => Kind::NotTested { reason },
-            None => Kind::Commands { exit: 0 },
-        },
+        ("sh", []) if remark("# not tested:").is_some() => {
+            return Err("say `<!-- not tested: REASON -->` before the block, where no reader sees it".into());
+        }
+        ("sh", []) => left_out.map_or(Kind::Commands { exit: 0 }, |reason| Kind::NotTested { reason }),
+        _ if left_out.is_some() => return Err("only a block `sh` can be said to be not tested".into()),
         ("sh", [one]) => match one.strip_prefix("exit=").map(str::parse) {
             Some(Ok(exit)) => Kind::Commands { exit },
             _ => return Err(format!("`{one}`: commands know `exit=CODE` only")),
@@ -161,7 +173,7 @@ mod tests {
     #[test]
     fn every_convention_is_read_with_its_line() {
         let page = "# Page\n```sh\npolicyc a\n```\n```text,shown\nok\n```\n```toml,file=a/b.toml\nx = 1\n```\n\
-                    ```sh,exit=1\nfalse\n```\n```sh\n# not tested: needs MATLAB\nmatlab\n```\n```rust\nlet x;\n```\n\
+                    ```sh,exit=1\nfalse\n```\n<!-- not tested: needs MATLAB -->\n```sh\nmatlab\n```\n```rust\nlet x;\n```\n\
                     ```sh\n# needs: fmpy\nfmpy\n```\n";
         let blocks = read(page).unwrap();
         let kinds: Vec<_> = blocks.iter().map(|block| (block.line, &block.kind)).collect();
@@ -173,7 +185,7 @@ mod tests {
                 (6, &Kind::Shown),
                 (9, &Kind::File("a/b.toml".into())),
                 (12, &Kind::Commands { exit: 1 }),
-                (15, &Kind::NotTested { reason }),
+                (16, &Kind::NotTested { reason }),
                 (22, &Kind::Commands { exit: 0 }),
             ]
         );
@@ -188,6 +200,8 @@ mod tests {
             "text\n\n    cargo build\n",
             "```bash\nls\n```\n",
             "```sh,ignore\nls\n```\n",
+            "```sh\n# not tested: a reason\nls\n```\n",
+            "<!-- not tested: a reason -->\n```toml,file=x\n```\n",
             "```toml,shown\nx = 1\n```\n",
             "```toml,file=x\n```\n```text,shown\nok\n```\n",
         ] {

@@ -17,8 +17,18 @@ pub struct Named {
     pub controller: Box<dyn Controller>,
 }
 
+/// What comes next, and how far the whole is.
+pub struct Next<'a> {
+    /// For people.
+    pub what: &'a dyn Display,
+    /// Pieces that are done: runs of one controller over one load step, and settled points. They take about the same time each.
+    pub done: u64,
+    /// Pieces that there are in all.
+    pub all: u64,
+}
+
 /// Is told what comes next; an error from it ends the whole.
-pub type Tell<'a> = dyn FnMut(&dyn Display) -> Result<(), Error> + 'a;
+pub type Tell<'a> = dyn FnMut(&Next<'_>) -> Result<(), Error> + 'a;
 
 /// A controller on one load step.
 #[derive(Debug, Clone, PartialEq)]

@@ -37,7 +37,7 @@ pub use controller::{
     Answer, Call, Classical, Controller, External, Period, Trajectory, follow, interpreter, interpreter_driving,
 };
 pub use converter::Converter;
-pub use course::{Course, Named, Tell};
+pub use course::{Course, Named, Next, Tell};
 pub use environment::{Environment, LoadPath, Start};
 pub use faults::Error;
 pub use load_step::{LoadKind, LoadStep};

@@ -2,12 +2,11 @@
 
 #![allow(clippy::unwrap_used)] // helpers of tests stand outside of #[test] functions
 
-use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-use closed_loop::simulation::{PAGE, Setting, simulate};
+use closed_loop::simulation::{PAGE, Setting, Spread, simulate};
 use closed_loop::transfer::{self, Means};
-use closed_loop::{Answer, Controller, Converter, Error, Named, Scenario, interpreter};
+use closed_loop::{Answer, Controller, Converter, Error, Named, Next, Scenario, interpreter};
 use plant::Signals;
 use policy::Policy;
 use toml_input::Message;
@@ -71,7 +70,7 @@ impl Controller for OneBitOff {
     }
 }
 
-fn go_on(_: &dyn Display) -> Result<(), Error> {
+fn go_on(_: &Next<'_>) -> Result<(), Error> {
     Ok(())
 }
 
@@ -138,11 +137,39 @@ fn one_controller_is_compared_with_none_and_leaves_all_files() {
     );
 }
 
+/// Every piece of the work is counted once, before any of it is done: the law of the time that is left asks for it.
+#[test]
+fn what_is_done_adds_up_to_what_was_announced() {
+    let spread = vec![Spread::parse("converter.inductance=57.8e-6,78.2e-6").unwrap()];
+    for (spread, converters) in [(vec![], 0), (spread, 5)] {
+        let of = setting().spread(spread, None).unwrap();
+        let mut told = Vec::new();
+        let one = vec![named("interpreter", interpreter(&policy()).unwrap())];
+        let found = simulate(of, one, &mut |next| {
+            told.push((next.what.to_string(), next.done, next.all));
+            Ok(())
+        });
+        let cells = found.unwrap().spread.map_or(0, |spread| spread.cells.len());
+        assert_eq!(cells, converters);
+        assert!(
+            told.windows(2)
+                .all(|pair| pair[0].1 <= pair[1].1 && pair[0].2 == pair[1].2),
+            "{told:?}"
+        );
+        // the last word is about a limit, behind all runs, or about the last converter of the spread, before its own
+        let (what, done, all) = told.last().unwrap();
+        match converters {
+            0 => assert!(what.ends_with("limit") && done == all, "{told:?}"),
+            _ => assert!(what.starts_with("converter 5 of 5") && done < all, "{told:?}"),
+        }
+    }
+}
+
 #[test]
 fn who_is_told_what_comes_next_can_end_it() {
     let mut told = Vec::new();
-    let mut tell = |what: &dyn Display| {
-        told.push(what.to_string());
+    let mut tell = |next: &Next<'_>| {
+        told.push(next.what.to_string());
         match told.len() {
             3 => Err(Message::new("enough").into()),
             _ => Ok(()),
@@ -168,9 +195,11 @@ fn a_transfer_that_is_ended_ran_nothing_more() {
     let real = [examples().join("drm/plants/lossy.toml")];
     let start = |policy: &Policy| Ok(named("interpreter", interpreter(policy)?));
     let mut told = 0;
-    let mut tell = |what: &dyn Display| {
+    let mut tell = |next: &Next<'_>| {
+        // ten points beside two runs in simulation, two without a mapping, two with it
+        assert_eq!((next.done, next.all), (told, 16));
         told += 1;
-        match what.to_string().ends_with("point 2 of 10") {
+        match next.what.to_string().ends_with("point 2 of 10") {
             true => Err(Message::new("enough").into()),
             false => Ok(()),
         }

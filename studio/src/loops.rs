@@ -209,8 +209,8 @@ pub(crate) fn simulate(session: &Session, request: &Value, tell: Tell) -> Result
     let policy = load(session, &of)?;
     let setting = Setting::new(Path::new(&file), scenario, policy, None)?;
     let named = vec![interpreted(&setting)?];
-    let found = run(setting, named, &mut |what| {
-        tell(&what.to_string());
+    let found = run(setting, named, &mut |next| {
+        tell(&next.what.to_string());
         Ok(())
     })?;
     let answer = Simulated {

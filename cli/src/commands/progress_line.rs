@@ -1,11 +1,11 @@
 //! Progress as one line.
 
-use std::fmt::Display;
 use std::io::{IsTerminal, Write};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use closed_loop::Next;
 use indicatif::HumanDuration;
 use toml_input::Faults;
 
@@ -56,13 +56,13 @@ impl ProgressLine {
         self.shown = self.replaces;
     }
 
-    /// Shows what comes next, for a library that tells it.
+    /// Shows what comes next and how long the whole still takes, for a library that tells it.
     ///
     /// # Errors
     /// If there is to be no next: the user has had enough.
-    pub fn next(&mut self, what: &dyn Display) -> Result<(), Faults> {
+    pub fn next(&mut self, next: &Next<'_>, pace: Pace) -> Result<(), Faults> {
         interruption::go_on()?;
-        self.show(|| what.to_string());
+        self.show(|| format!("{}{}", next.what, pace.left(next.done, next.all)));
         Ok(())
     }
 

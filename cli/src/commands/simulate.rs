@@ -11,7 +11,7 @@ use toml_input::FileName;
 
 use super::controllers;
 use super::foreign::opener;
-use super::progress_line::ProgressLine;
+use super::progress_line::{Pace, ProgressLine};
 use crate::arguments::Simulate;
 use crate::failure::Failure;
 use crate::interruption;
@@ -110,8 +110,8 @@ fn signed(options: &Simulate, found: &Findings) -> Result<BTreeMap<String, Strin
 /// Starts the controllers and simulates.
 fn all(options: &Simulate, setting: Setting) -> Result<Findings, Failure> {
     let named = controllers::start_all(&setting.policy, setting.output, options.controller, options.check)?;
-    let mut line = ProgressLine::new();
-    let found = simulate(setting, named, &mut |what| line.next(what))?;
+    let (mut line, pace) = (ProgressLine::new(), Pace::new());
+    let found = simulate(setting, named, &mut |next| line.next(next, pace))?;
     line.clear();
     Ok(found)
 }

@@ -1,5 +1,7 @@
 //! All controllers over all load steps.
 
+use std::fmt::Display;
+
 use policy::Scalar;
 use toml_input::{Fault, Message};
 
@@ -9,7 +11,7 @@ use crate::agent::Agent;
 use crate::baselines::{Baseline, Kind, observed};
 use crate::beyond::beyond;
 use crate::controller::{Classical, Controller, Trajectory, follow};
-use crate::course::{Course, Named, Tell};
+use crate::course::{Course, Named, Next, Tell};
 use crate::faults::Error;
 use crate::limit::{Limit, Question};
 use crate::load_step::LoadStep;
@@ -17,10 +19,13 @@ use crate::scenario::Instant;
 use crate::unusable::unusable;
 
 /// Where a simulation stands.
-struct Progress<'a, 'b> {
+pub(super) struct Progress<'a, 'b> {
     tell: &'a mut Tell<'b>,
+    /// Load steps.
     of: usize,
     done: usize,
+    /// Runs that are done, and that there are in all.
+    runs: [u64; 2],
 }
 
 impl Progress<'_, '_> {
@@ -30,7 +35,21 @@ impl Progress<'_, '_> {
     /// If there is to be no next.
     fn next(&mut self, step: LoadStep, what: &str) -> Result<(), Error> {
         let (number, of) = (self.done + 1, self.of);
-        (self.tell)(&format_args!("{step} ({number} of {of}): {what}"))
+        self.say(&format_args!("{step} ({number} of {of}): {what}"))
+    }
+
+    /// Tells what comes next, whatever it is.
+    ///
+    /// # Errors
+    /// If there is to be no next.
+    pub(super) fn say(&mut self, what: &dyn Display) -> Result<(), Error> {
+        let [done, all] = self.runs;
+        (self.tell)(&Next { what, done, all })
+    }
+
+    /// So many runs more are done.
+    pub(super) fn ran(&mut self, runs: usize) {
+        self.runs[0] += runs as u64;
     }
 }
 
@@ -48,10 +67,17 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
     let mut beside: Vec<Beside> = law(&setting)?.into_iter().collect();
     beside.extend(classical(&mut setting));
     let load_steps = setting.scenario.load_steps.clone();
+    let mut names = vec![POLICY; named.len()];
+    names.extend(beside.iter().map(|(name, _)| name.as_str()));
+    let runs = runs_of(&setting, &names, setting.scenario.task.all_instants().len());
     let mut progress = Progress {
         tell,
         of: load_steps.len(),
         done: 0,
+        runs: [
+            0,
+            (runs + spread::runs(&setting, &names[named.len().saturating_sub(1)..])) as u64,
+        ],
     };
     let mut steps = Vec::new();
     for step in load_steps {
@@ -66,7 +92,9 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
         for (name, controller) in beside {
             let course = Course::new(step, &setting.scenario.task, |instant| {
                 progress.next(step, name)?;
-                run(&setting, controller.as_mut(), step, instant)
+                let found = run(&setting, controller.as_mut(), step, instant);
+                progress.ran(1);
+                found
             });
             courses.push(((*name).to_owned(), course?));
         }
@@ -80,7 +108,7 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
     let mut all: Vec<(&str, &mut Box<dyn Controller>)> = Vec::new();
     all.extend(named.first_mut().map(|first| (POLICY, &mut first.controller)));
     all.extend(beside.iter_mut().map(|(name, controller)| (name.as_str(), controller)));
-    let spread = spread::run(&setting, &mut all, &mut |what| (progress.tell)(&format_args!("{what}")))?;
+    let spread = spread::run(&setting, &mut all, &mut progress)?;
     Ok(Findings {
         spread,
         controller: named.first().map(|named| named.name.clone()).unwrap_or_default(),
@@ -88,6 +116,13 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
         steps,
         check,
     })
+}
+
+/// Runs of controllers of these names over all load steps, at so many instants each.
+pub(super) fn runs_of(setting: &Setting, names: &[&str], instants: usize) -> usize {
+    let steps = &setting.scenario.load_steps;
+    let of = |name: &&str| steps.iter().filter(|step| knows(name, **step)).count();
+    instants * names.iter().map(of).sum::<usize>()
 }
 
 /// Whether a controller has a part in a step: of the reference only those know that are told.
@@ -188,6 +223,7 @@ fn policy_course(
     Course::new(step, &setting.scenario.task, |instant| {
         progress.next(step, &first.name)?;
         let reference = run(setting, first.controller.as_mut(), step, instant)?;
+        progress.ran(1);
         let Some(check) = &mut check else {
             return Ok(reference);
         };
@@ -195,6 +231,7 @@ fn policy_course(
         for (other, different) in others.iter_mut().zip(&mut different) {
             progress.next(step, &other.name)?;
             let trajectory = run(setting, other.controller.as_mut(), step, instant)?;
+            progress.ran(1);
             let first = reference.first_difference(&trajectory);
             if let Some(period) = first.filter(|_| !*different) {
                 *different = true;

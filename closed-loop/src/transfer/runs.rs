@@ -11,7 +11,7 @@ use super::findings::{EXACT, Findings, MAPPED, Means, Real, Run, SIMULATION, Set
 use super::ideal::Ideal;
 use crate::controller::{Controller, follow};
 use crate::converter::Converter;
-use crate::course::Course;
+use crate::course::{Course, Next};
 use crate::environment::Environment;
 use crate::faults::{Error, told};
 use crate::load_step::LoadStep;
@@ -22,11 +22,16 @@ use crate::suits::suits;
 struct Progress<'a, 'b, E> {
     means: &'a mut Means<'b, E>,
     at: String,
+    /// Runs and points that are begun, and that there are in all.
+    pieces: [u64; 2],
 }
 
 impl<E> Progress<'_, '_, E> {
     fn next(&mut self, what: impl std::fmt::Display) -> Result<(), Error> {
-        (self.means.tell)(&format_args!("{}: {what}", self.at))
+        let [done, all] = self.pieces;
+        self.pieces[0] += 1;
+        let what = &format_args!("{}: {what}", self.at);
+        (self.means.tell)(&Next { what, done, all })
     }
 }
 
@@ -59,9 +64,11 @@ pub fn transfer<E: Environment>(
     }
     let unmapped = (means.start)(&setting.refit().with(&DutyRatioMap::IDENTITY)?)?;
     let (controller, mut unmapped) = (unmapped.name, unmapped.controller);
+    let all = pieces(&setting, &benches, means.ideal)?;
     let mut progress = Progress {
         means: &mut means,
         at: SIMULATION.to_owned(),
+        pieces: [0, all],
     };
     let simulation = Converter::new(&setting.nominal)?;
     let simulation = run(SIMULATION, &setting, &simulation, unmapped.as_mut(), &mut progress)?;
@@ -77,6 +84,16 @@ pub fn transfer<E: Environment>(
         found.real.push(real);
     }
     Ok(found)
+}
+
+/// Runs and points of a whole transfer.
+fn pieces<E>(setting: &Setting, benches: &[Bench<'_, E>], ideal: bool) -> Result<u64, Error> {
+    let runs = setting.scenario.load_steps.len() * setting.scenario.task.all_instants().len();
+    // without the mapping, with it, with the exact one
+    let each = runs * (2 + usize::from(ideal));
+    let points = |bench: &Bench<'_, E>| Ok(setting.refit().plan(bench.parameters.converter.v_in)?.points.len());
+    let points: usize = benches.iter().map(points).sum::<Result<usize, Error>>()?;
+    Ok((runs + each * benches.len() + points) as u64)
 }
 
 /// A real converter before its runs.

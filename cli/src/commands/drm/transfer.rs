@@ -11,7 +11,7 @@ use spice::SpiceConverter;
 use crate::arguments::drm::{Simulator, Transfer};
 use crate::commands::controllers;
 use crate::commands::foreign::opener;
-use crate::commands::progress_line::ProgressLine;
+use crate::commands::progress_line::{Pace, ProgressLine};
 use crate::failure::Failure;
 use crate::interruption;
 use crate::made;
@@ -72,14 +72,14 @@ fn at<E: Environment>(
     simulator: &'static str,
     simulate: &dyn Fn(&Path, &Parameters) -> Result<E, Error>,
 ) -> Result<Findings, Failure> {
-    let mut line = ProgressLine::new();
+    let (mut line, pace) = (ProgressLine::new(), Pace::new());
     let output = setting.output;
     let means = Means {
         simulator,
         simulate,
         start: &|policy| controllers::start(policy, output, options.controller),
         ideal: options.ideal,
-        tell: &mut |what| line.next(what),
+        tell: &mut |next| line.next(next, pace),
     };
     let found = transfer(setting, &options.real, means)?;
     line.clear();

@@ -15,7 +15,7 @@ pub use range::{Draws, Spread};
 pub(super) use shown::Json;
 
 use super::findings::Setting;
-use super::runs::knows;
+use super::runs::{Progress, knows, runs_of};
 use crate::controller::{Controller, follow};
 use crate::converter::Converter;
 use crate::faults::Error;
@@ -45,14 +45,29 @@ pub struct Spreads {
     pub cells: Vec<Cell>,
 }
 
-/// Runs all controllers on all converters; `tell` is called before each converter.
+/// Runs of controllers of these names on all converters.
+pub(super) fn runs(setting: &Setting, names: &[&str]) -> usize {
+    let converters = range::converters(&setting.spread, setting.draws).len();
+    converters * runs_of(setting, names, task(setting).all_instants().len())
+}
+
+/// The task at a converter of the spread, of which there are many.
+fn task(setting: &Setting) -> Task {
+    Task {
+        instants: INSTANTS,
+        sampling_instants: 1,
+        ..setting.scenario.task.clone()
+    }
+}
+
+/// Runs all controllers on all converters; `progress` is told before each converter.
 ///
 /// # Errors
-/// If numbers make no converter, a controller fails, or `tell` ends it.
+/// If numbers make no converter, a controller fails, or who is told ends it.
 pub(super) fn run(
     setting: &Setting,
     controllers: &mut [(&str, &mut Box<dyn Controller>)],
-    tell: &mut dyn FnMut(&str) -> Result<(), Error>,
+    progress: &mut Progress<'_, '_>,
 ) -> Result<Option<Spreads>, Error> {
     let of = &setting.spread;
     let converters = range::converters(of, setting.draws);
@@ -60,6 +75,8 @@ pub(super) fn run(
         return Ok(None);
     }
     let count = converters.len();
+    let names: Vec<&str> = controllers.iter().map(|(name, _)| *name).collect();
+    let runs_each = runs(setting, &names) / count;
     let mut cells = Vec::new();
     for (n, numbers) in converters.into_iter().enumerate() {
         let keys = of.iter().map(|spread| spread.key.as_str());
@@ -68,8 +85,9 @@ pub(super) fn run(
             .iter()
             .map(|(key, value)| format!("{key} = {value:.4e}"))
             .collect();
-        tell(&format!("converter {} of {count}: {}", n + 1, text.join(", ")))?;
+        progress.say(&format_args!("converter {} of {count}: {}", n + 1, text.join(", ")))?;
         cells.push(cell(setting, &setting.converter.with(&named)?, numbers, controllers)?);
+        progress.ran(runs_each);
     }
     Ok(Some(Spreads {
         of: of.clone(),
@@ -84,11 +102,7 @@ fn cell(
     numbers: Vec<f64>,
     controllers: &mut [(&str, &mut Box<dyn Controller>)],
 ) -> Result<Cell, Error> {
-    let task = Task {
-        instants: INSTANTS,
-        sampling_instants: 1,
-        ..setting.scenario.task.clone()
-    };
+    let task = task(setting);
     let mut worst = Vec::new();
     for (name, controller) in controllers {
         let mut metrics = Metrics::default();

@@ -261,7 +261,10 @@ fn map_section(policy: &Policy, statement: &Statement, map: &Map, picture: Optio
         .zip(&map.slice.at)
         .enumerate()
         .filter(|(index, _)| *index != map.slice.x.0 && *index != map.slice.y.0)
-        .map(|(_, (coordinate, value))| format!("{} = {value} {}", coordinate.name, coordinate.unit))
+        .map(|(_, (coordinate, value))| {
+            let text = format!("{} = {} {}", coordinate.name, plain(*value), coordinate.unit);
+            text.trim_end().to_owned()
+        })
         .collect();
     let caption = format!(
         "Colour: the action that is proven for the whole cell, in real arithmetic and in the format. Grey: not proven; the borders \
@@ -286,6 +289,12 @@ fn map_section(policy: &Policy, statement: &Statement, map: &Map, picture: Optio
     }
 }
 
+/// A value to the six digits that a duty of binary32 has; its binary64 would show sixteen.
+fn plain(value: f64) -> String {
+    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    rounded.to_string()
+}
+
 fn meaning(policy: &Policy, certificate: &Certificate) -> Section {
     let mut table = Table::new("Coordinates of a state")
         .text("coordinate")
@@ -296,8 +305,8 @@ fn meaning(policy: &Policy, certificate: &Certificate) -> Section {
         let text = |text: &str| Cell::Text(text.to_owned());
         table = table.row([
             text(name),
-            text(&range.low.to_string()),
-            text(&range.high.to_string()),
+            text(&plain(range.low)),
+            text(&plain(range.high)),
             text(unit),
         ]);
     }

@@ -115,7 +115,8 @@ export class DecisionMap {
     });
     const scale = make("canvas");
     paint(scale, 64, 1, (column) => column / 63);
-    const chosen = actions.length ? ` ${new Set(actions).size} actions are chosen here.` : "";
+    const count = new Set(actions).size;
+    const chosen = count ? ` ${count === 1 ? "One action is" : `${count} actions are`} chosen here.` : "";
     at("map").replaceChildren(
       make("div", { class: "scale" }, make("span", {}, `duty ${digits(low)}`), scale, make("span", {}, digits(high))),
       make("div", { class: "plot" },

@@ -4,8 +4,9 @@ use policy::Activation;
 use policy::limits::MAX_OUTPUTS;
 use toml_input::Message;
 
+use super::Walk;
 use super::model::Node;
-use super::{Walk, other, unknown};
+use super::words::{other, unknown};
 use crate::actor::{self, Actor, Duty, Squash};
 
 /// What the outputs of a graph command.

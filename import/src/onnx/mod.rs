@@ -13,15 +13,16 @@ mod command;
 mod model;
 mod norm;
 mod wire;
+mod words;
 
 use policy::{Activation, DraftFeature};
 use toml_input::{FileName, Message};
 
-use crate::activations;
 use crate::actor::{self, Actor, Duty, Squash};
 use crate::network::{Layer, Network};
 use command::Commands;
 use model::{Constant, Graph, Node};
+use words::{EXPORT, is_sixth, named, not_compiled, other, unknown, word};
 
 /// What a graph computes.
 #[derive(Debug)]
@@ -109,14 +110,6 @@ pub(crate) fn read(file: &FileName, bytes: &[u8], (picked, gains): (Option<usize
         &graph.outputs.join(", "),
         "one node behind another",
     ))
-}
-
-fn named(node: &Node) -> String {
-    format!("{} `{}`", node.operation.escape_debug(), node.name.escape_debug())
-}
-
-fn other(what: &str, found: &str, expected: &str) -> Message {
-    Message::new(what).found(found).expected(expected)
 }
 
 struct Walk<'a> {
@@ -418,40 +411,4 @@ fn spread(values: &[f64], count: usize) -> Option<Vec<f64>> {
         [one] => Some(vec![*one; count]),
         _ => (values.len() == count).then(|| values.to_vec()),
     }
-}
-
-/// The word for a node that is an activation.
-fn word(node: &Node) -> Option<&'static str> {
-    let number = |name: &str, otherwise: f64| node.floats.get(name).copied().unwrap_or(otherwise);
-    match node.operation.as_str() {
-        "Gelu" if node.texts.get("approximate").is_some_and(|by| by == "tanh") => Some(activations::GELU_TANH),
-        "Gelu" => Some(activations::GELU),
-        // other parameters make other functions, for which there is no word
-        "Elu" if number("alpha", 1.0) != 1.0 => None,
-        "HardSigmoid" if !is_sixth(node) => None,
-        operation => activations::word_of_onnx(operation),
-    }
-}
-
-/// A hard sigmoid with the slope of torch and Keras 3; that of ONNX itself is 0.2.
-fn is_sixth(node: &Node) -> bool {
-    let number = |name: &str, otherwise: f64| node.floats.get(name).copied().unwrap_or(otherwise);
-    (number("alpha", 0.2) - 1.0 / 6.0).abs() < 1e-6 && number("beta", 0.5) == 0.5
-}
-
-fn not_compiled(node: &Node, word: &str) -> Message {
-    activations::refusal(word, &named(node))
-}
-
-const EXPORT: &str =
-    "export the policy network alone, in evaluation: torch.onnx.export(net.eval(), (obs,), \"policy.onnx\")";
-
-fn unknown(node: &Node) -> Message {
-    Message::new("this node is not read, or not at this place of the graph")
-        .found(named(node))
-        .expected(
-            "a chain of Gemm, MatMul, Add, Sub, Mul, Div with constants, Relu, Tanh and other activations, a Clip before and an ArgMax behind, \
-             and reshapes",
-        )
-        .hint(EXPORT)
 }

@@ -3,7 +3,7 @@
 use toml_input::Message;
 
 use super::model::Node;
-use super::named;
+use super::words::named;
 use crate::recognise;
 
 /// The way out of a norm over the values of a step.

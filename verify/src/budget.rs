@@ -132,13 +132,17 @@ impl Budget {
             _ => ", and compute_delay = 1 in the contract",
         };
         (self.fit != Fit::Missed && most > HALF).then(|| {
-            let sampled = match most < 1.0 {
-                true => format!("Sampled later than {:.0} % into the PWM period,", 100.0 * (1.0 - most)),
-                false => "Wherever in the PWM period it is sampled,".to_owned(),
+            let acts = match most < 1.0 {
+                true => format!(
+                    "Sampled within the first {:.0} % of the PWM period, its duty acts from the next start on; later, it can miss that",
+                    100.0 * (1.0 - most)
+                ),
+                false => "Wherever in the PWM period it is sampled, its duty can miss the next start".to_owned(),
             };
             format!(
-                "  note: a step takes up to {:.0} % of the period. {sampled} its duty can miss the next start and act one period later: \
-                 train with pwm.duty_delay = 1 in the plant file then{and_there}",
+                "  note: a step takes up to {:.0} % of the period. {acts} and act one period later. A training that sampled at the start \
+                 had a duty that acts at that start, which no timer gives. Train with pwm.duty_delay = 1 in the plant file in both \
+                 cases{and_there}",
                 100.0 * most
             )
         })
@@ -227,7 +231,7 @@ mod tests {
         assert!(
             lateness((2_000, 6_200))
                 .unwrap()
-                .contains("later than 38 % into the PWM period")
+                .contains("within the first 38 % of the PWM period")
         );
         assert!(
             lateness((5_000, 10_001))

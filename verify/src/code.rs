@@ -20,7 +20,7 @@ pub struct Code {
     pub outputs: Vec<Output>,
     /// Texts by name.
     pub files: Files,
-    /// What the format does to the trainer's decisions, in words; empty where it changes none.
+    /// What the format does to the trainer's decisions, in words; empty where floats change none.
     pub decisions: Vec<String>,
 }
 
@@ -88,14 +88,17 @@ fn accepted(policy: &Policy, golden_decisions: Option<f64>) -> Result<Vec<String
     match decisions(policy, golden_decisions) {
         None => Ok(Vec::new()),
         Some(decisions) if decisions.kept() => {
-            let changes = |own: &Decisions| match own {
-                Decisions::Choice(choices) => choices.changed > 0,
-                _ => policy.numeric_format.is_integer(),
+            // integers are expected to change some, so that none is told, too
+            let is_integer = policy.numeric_format.is_integer();
+            let lines_of = |own: &Decisions| match own {
+                Decisions::Choice(choices) if choices.changed > 0 => 2,
+                Decisions::Choice(_) => usize::from(is_integer),
+                _ => 2 * usize::from(is_integer),
             };
             // the counts; where it changes most is told by `inspect`
             let told = |(output, own): (Option<&str>, &Decisions)| {
                 let lines = text::of_output(policy, output, own);
-                lines.into_iter().take(if changes(own) { 2 } else { 0 })
+                lines.into_iter().take(lines_of(own))
             };
             let mut lines: Vec<String> = decisions.each().into_iter().flat_map(told).collect();
             if lines.is_empty() {

@@ -358,9 +358,18 @@ fn incomplete(sheet: &Sheet, located: &Located, may_be_capture: bool) -> Sink {
         };
         // the map last: what is copied ends with the line
         let record = sheet.file().file_stem().unwrap_or_default().to_string_lossy();
+        let named = NAMES.iter().filter_map(|name| Some((name, located.signal(name)?)));
+        let by_name: Vec<String> = named
+            .filter(|(name, signal)| signal.column().is_some() && signal.label != **name)
+            .map(|(name, signal)| format!("{} as {name}", signal.label))
+            .collect();
+        let others = match by_name.is_empty() {
+            true => String::new(),
+            false => format!("; {} need no map", by_name.join(", ")),
+        };
         let proposed = format!(
-            "these columns look like it, check each{metered}; as [records.{record}.columns] of a map file where other files have \
-             others: {map}"
+            "these columns look like it, check each{metered}{others}; as [records.{record}.columns] of a map file where other files \
+             have others: {map}"
         );
         first.hint = Some(match first.hint.take() {
             Some(hint) if has("duty") => format!("{hint}; {proposed}"),

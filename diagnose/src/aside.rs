@@ -139,10 +139,11 @@ pub fn explained_without(
 
 /// The one channel in which causes that leave no structure do not hold in held-out records: what disturbs it did not show before.
 fn spoilt_later(whole: &Examined) -> Option<Part> {
-    let mut channels = whole.doubts.iter().filter_map(|doubt| match doubt {
-        Doubt::HeldOut(channel, _) => Some(*channel),
-        _ => None,
-    });
+    let of = |doubt| match doubt {
+        &Doubt::HeldOut(ref channels, _) => channels.as_slice(),
+        _ => &[],
+    };
+    let mut channels = whole.doubts.iter().flat_map(of).copied();
     let first = channels.next()?;
     (channels.all(|other| other == first) && may_miss(&whole.problem, first)).then_some(Part::Channel(first))
 }

@@ -248,7 +248,8 @@ fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<Str
     let mut near = String::new();
     if !explained && !found.is_misread() {
         odd.extend(other_carrier(problem, attribution));
-        near = nearest(&found.named, attribution.removed(problem)) + &other_carrier_said(found);
+        near = nearest(&found.named, attribution.removed(problem), found.fits_training_alone())
+            + &other_carrier_said(found);
     }
     odd.extend(notes(found, pair));
     let mut causes = if explained { found.named.clone() } else { Vec::new() };

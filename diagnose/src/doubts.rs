@@ -34,8 +34,8 @@ fn is_cut_off([low, high]: [f64; 2], is_size: bool, value: f64) -> bool {
 pub enum Doubt {
     /// A value at its bound: whatever else would do as well, it is not this.
     Bound(String),
-    /// Values that do not hold in a channel of records that no fit has seen.
-    HeldOut(usize, String),
+    /// Values that do not hold in channels of a record that no fit has seen.
+    HeldOut(Vec<usize>, String),
     /// An interval that reaches it: nothing is explained, a tie may be left.
     Open(String),
     /// More freedom than the data have.

@@ -182,6 +182,12 @@ impl Examined {
         self.verdict = verdict(&self.named, &self.read_off, holds);
     }
 
+    /// Whether the causes explain the training records, and nothing but the held-out ones speaks against them.
+    pub fn fits_training_alone(&self) -> bool {
+        let is_held_out = |doubt: &Doubt| matches!(doubt, Doubt::HeldOut(..));
+        self.structure.is_empty() && !self.doubts.is_empty() && self.doubts.iter().all(is_held_out)
+    }
+
     /// Lets the held-out records judge; causes that do not hold in them explain nothing any more.
     pub fn judged(&mut self, heldout: &[Record], base: &Model) -> Option<Pair> {
         let found = self.attribution.state();
@@ -193,8 +199,11 @@ impl Examined {
             if !fails.is_empty() {
                 self.verdict = Verdict::Unexplained;
             }
-            self.doubts
-                .extend(fails.into_iter().map(|(channel, words)| Doubt::HeldOut(channel, words)));
+            self.doubts.extend(
+                fails
+                    .into_iter()
+                    .map(|(channels, words)| Doubt::HeldOut(channels, words)),
+            );
         }
         Some(pair)
     }

@@ -287,10 +287,10 @@ impl Pair {
         })
     }
 
-    /// Channels, with words, in which the extended model leaves much more than in the training records, though none of it is the same
-    /// throughout, as a sensor that has shifted would leave: what was found does not hold there.
+    /// Channels of a record, with words, in which the extended model leaves much more than in the training records, though none of it is
+    /// the same throughout, as a sensor that has shifted would leave: what was found does not hold there.
     #[must_use]
-    pub fn doubts(&self, training: &Problem, at: &State) -> Vec<(usize, String)> {
+    pub fn doubts(&self, training: &Problem, at: &State) -> Vec<(Vec<usize>, String)> {
         let shifts = self.shifts(training, at);
         let is_more = |shift: &&Shift| {
             let (index, n) = (shift.index, shift.number);
@@ -304,15 +304,15 @@ impl Pair {
             let usual = after.square / (shift.ratio * shift.ratio);
             after.lag1.abs() > RELATED && after.square > MUCH_WORSE * usual + ACCURACY * ACCURACY * before.square
         };
-        let words = |shift: &Shift| {
-            let said = format!(
-                "{} of the held-out record {} is {:.1} times as far from the model with these causes as the training records: they do \
-                 not hold there",
-                shift.channel, shift.record, shift.ratio
-            );
-            (shift.number, said)
-        };
-        shifts.iter().filter(is_more).map(words).collect()
+        let more: Vec<&Shift> = shifts.iter().filter(is_more).collect();
+        more.chunk_by(|one, other| one.index == other.index)
+            .map(|of_record| {
+                (
+                    of_record.iter().map(|shift| shift.number).collect(),
+                    not_there(of_record),
+                )
+            })
+            .collect()
     }
 
     /// Records that the extended model does not fit as it fits the training records; `training` are the training records at that model.
@@ -394,4 +394,23 @@ fn is_in(regime: Regime, problem: &Problem, record: &Record, row: usize) -> bool
         Regime::Discontinuous => is_discontinuous,
         Regime::Transient => !record.settled && (row.saturating_sub(TRANSIENT).max(1)..=row).any(moved),
     }
+}
+
+/// Said of channels of one record.
+fn not_there(of_record: &[&Shift]) -> String {
+    let Some(first) = of_record.first() else {
+        return String::new();
+    };
+    let channels: Vec<&str> = of_record.iter().map(|shift| shift.channel).collect();
+    let (are, up_to) = match channels.len() {
+        1 => ("is", ""),
+        _ => ("are", "up to "),
+    };
+    let ratio = of_record.iter().map(|shift| shift.ratio).fold(0.0, f64::max);
+    format!(
+        "{} of the held-out record {} {are} {up_to}{ratio:.1} times as far from the model with these causes as the training records: \
+         they do not hold there",
+        channels.join(", "),
+        first.record
+    )
 }

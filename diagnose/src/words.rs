@@ -33,6 +33,10 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>) -> St
                 true => String::new(),
                 false => format!("; left is {}", shapes(&all)),
             };
+            if found.fits_training_alone() {
+                let doubts = doubts::said(&found.doubts).join("; ");
+                return format!("What explains the training records does not hold in what was held out: {doubts}.");
+            }
             let doubts: String = (doubts::said(&found.doubts).iter())
                 .map(|doubt| format!("; {doubt}"))
                 .collect();
@@ -170,8 +174,8 @@ pub fn needs(values: &[RivalValue]) -> String {
 }
 
 /// Said where nothing explains the records: which causes come nearest, and the share of the error above the noise that they take away.
-/// Intervals would claim more than is known.
-pub fn nearest(partial: &[Named], removed: f64) -> String {
+/// Intervals would claim more than is known. `fits_training` if nothing but the held-out records speaks against them.
+pub fn nearest(partial: &[Named], removed: f64, fits_training: bool) -> String {
     let one = |cause: &Named| {
         let values = cause.parameters.iter().map(|(name, v)| {
             let unit = unit(v.unit);
@@ -187,6 +191,11 @@ pub fn nearest(partial: &[Named], removed: f64) -> String {
     match list.is_empty() {
         true => " No cause takes away a part of it that is more than noise.".to_owned(),
         // "takes away 100 %" and "no explanation" in one sentence: what speaks against it has been said before
+        false if fits_training => format!(
+            " Nearest comes {}. That explains the training records. What is held out shows something that they do not: fit it, too, and hold \
+             out another record.",
+            list.join("; with ")
+        ),
         false if removed > 0.995 => format!(
             " Nearest comes {}. That takes away the error above the noise as a whole, but what was said above speaks against it.",
             list.join("; with ")

@@ -145,9 +145,20 @@ fn what_does_not_hold_in_a_held_out_record_is_no_explanation() {
         findings
             .doubts
             .iter()
-            .any(|doubt| doubt.contains("of the held-out record held is")),
+            .any(|doubt| doubt.contains("of the held-out record held ")),
         "{:?}",
         findings.doubts
+    );
+    // one sentence for a record, and the way on
+    assert_eq!(findings.doubts.len(), 1, "{:?}", findings.doubts);
+    let sentence = &findings.sentence;
+    assert!(
+        sentence.starts_with("What explains the training records does not hold"),
+        "{sentence}"
+    );
+    assert!(
+        sentence.contains("fit it, too, and hold out another record"),
+        "{sentence}"
     );
     // what was found is shown as the part that it is
     assert!(findings.causes.is_empty());

@@ -12,7 +12,7 @@ use policy::scales::{self, InputScale};
 
 use crate::claim::{Claim, Verdict};
 use crate::program::{self, Failed, Stopped};
-use crate::{Prover, Task, Watch};
+use crate::{Next, Prover, Task, Watch};
 
 /// Conversions of the integer formats, against the contract's formula in binary64.
 #[derive(Debug, Clone, Copy)]
@@ -60,12 +60,14 @@ impl Prover for Exhaustive {
             }
         };
         let mut claims = Vec::new();
-        for conversion in &conversions {
+        for (done, conversion) in conversions.iter().enumerate() {
             let names = conversion.names(task);
-            (watch.say)(&format!(
-                "{}: conversion of {names}, all 2^32 numbers",
-                task.policy.name
-            ));
+            let what = format!("{}: conversion of {names}, all 2^32 numbers", task.policy.name);
+            (watch.say)(Next {
+                what: &what,
+                done,
+                all: conversions.len(),
+            });
             let begun = Instant::now();
             let tried = conversion.run(task, watch);
             let (verdict, reason, details) = match tried {

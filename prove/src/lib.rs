@@ -38,10 +38,29 @@ pub struct Task<'a> {
     pub target: &'static TargetSpec,
 }
 
+/// What comes next, and how far the prover at hand is with the policy at hand.
+#[derive(Debug, Clone, Copy)]
+pub struct Next<'a> {
+    /// For people.
+    pub what: &'a str,
+    /// Pieces that are done, or begun where they run side by side.
+    pub done: usize,
+    /// Pieces that there are; 0 where it is not known yet.
+    pub all: usize,
+}
+
+impl<'a> Next<'a> {
+    /// Of work whose pieces are not known yet.
+    #[must_use]
+    pub const fn first(what: &'a str) -> Self {
+        Self { what, done: 0, all: 0 }
+    }
+}
+
 /// How a run is watched.
 pub struct Watch<'a> {
     /// Is told what comes next.
-    pub say: &'a (dyn Fn(&str) + Sync),
+    pub say: &'a (dyn Fn(Next<'_>) + Sync),
     /// Ends the run when set.
     pub stop: &'a Stop,
 }

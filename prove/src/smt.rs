@@ -7,7 +7,7 @@ use equivalence::{Goal, Options, Reading, Solver, Source, Sources};
 
 use crate::claim::{Claim, Verdict};
 use crate::program::Stopped;
-use crate::{Prover, Task, Watch};
+use crate::{Next, Prover, Task, Watch};
 
 /// Every function of a step, in both languages, does what the contract says; so do the helpers that Frama-C reads in the place of masks.
 #[derive(Debug, Clone, Copy)]
@@ -19,7 +19,7 @@ const SUBJECT: &str = "C and Rust against the contract, every state, measurement
 
 impl Prover for Smt {
     fn prove(&self, task: Task<'_>, watch: &Watch<'_>) -> Result<Vec<Claim>, Stopped> {
-        (watch.say)("looking for a solver of SMT-LIB 2");
+        (watch.say)(Next::first("looking for a solver of SMT-LIB 2"));
         let Some(solver) = Solver::find().into_iter().next() else {
             let why = format!("neither bitwuzla, cvc5 nor z3 is here; install one: {INSTALL}");
             // the goals are known without a solver: so is how many claims wait for one
@@ -44,10 +44,12 @@ impl Prover for Smt {
             done += 1;
             let policy = task.policy;
             let format = policy.numeric_format.name();
-            (watch.say)(&format!(
-                "{} in {format}: {} ({done} of {total})",
-                policy.name, claim.name
-            ));
+            let what = format!("{} in {format}: {} ({done} of {total})", policy.name, claim.name);
+            (watch.say)(Next {
+                what: &what,
+                done,
+                all: total,
+            });
         });
         if watch.stop.load(std::sync::atomic::Ordering::Relaxed) {
             return Err(Stopped);

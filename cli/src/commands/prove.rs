@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::Ordering;
 
-use prove::{Answer, Task, Watch, page, provers};
+use prove::{Answer, Next, Task, Watch, page, provers};
 
-use super::progress_line::ProgressLine;
+use super::progress_line::{Pace, ProgressLine};
 use crate::arguments::Prove;
 use crate::failure::Failure;
 use crate::interruption;
@@ -14,6 +14,33 @@ use crate::made;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::talk;
+
+/// A line whose time left is that of the prover at hand: how many pieces the next one has is not known before it begins.
+struct Stages {
+    line: ProgressLine,
+    pace: Pace,
+    /// Pieces of the stage at hand.
+    all: usize,
+}
+
+impl Stages {
+    fn new() -> Self {
+        Self {
+            line: ProgressLine::new(),
+            pace: Pace::new(),
+            all: 0,
+        }
+    }
+
+    fn show(&mut self, next: Next<'_>) {
+        if next.all != self.all || next.done == 0 {
+            (self.pace, self.all) = (Pace::new(), next.all);
+        }
+        let pace = self.pace;
+        self.line
+            .show(|| format!("{}{}", next.what, pace.left(next.done as u64, next.all as u64)));
+    }
+}
 
 /// Proves, draws, writes.
 pub fn run(options: &Prove) -> Result<Outcome, Failure> {
@@ -32,14 +59,17 @@ pub fn run(options: &Prove) -> Result<Outcome, Failure> {
         codegen::sources(policy, target, &[codegen::Output::C], None)?;
     }
     let tasks: Vec<Task<'_>> = policies.iter().map(|policy| Task { policy, target }).collect();
-    let line = Mutex::new(ProgressLine::new());
-    let say = |what: &str| {
+    let line = Mutex::new(Stages::new());
+    let say = |next: Next<'_>| {
         let mut line = line.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        line.show(|| what.to_owned());
+        line.show(next);
     };
     let watch = Watch { say: &say, stop: &stop };
     let claims = prove::run(&tasks, &provers(options.exhaustive), &watch);
-    line.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
+    line.lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner)
+        .line
+        .clear();
     let (Ok(claims), false) = (claims, stop.load(Ordering::Relaxed)) else {
         talk::interrupted("nothing written");
         return Ok(Outcome::Interrupted);

@@ -21,7 +21,7 @@ use policy::NumericFormat;
 
 use crate::claim::{Claim, Verdict};
 use crate::program::Stopped;
-use crate::{Prover, Task, Watch};
+use crate::{Next, Prover, Task, Watch};
 use driver::{Driver, Entry};
 use frama_c::{Analysis, Found, INSTALL, Machine, Numbers};
 use text::Labels;
@@ -46,7 +46,7 @@ impl Prover for Eva {
         if let Some(why) = beyond(task) {
             return Ok(vec![not_run(task, why)]);
         }
-        (watch.say)("looking for Frama-C");
+        (watch.say)(Next::first("looking for Frama-C"));
         let Some(tool) = frama_c::version(watch.stop) else {
             let why = format!("{} is not on PATH; install it: {INSTALL}", frama_c::PROGRAM);
             return Ok(vec![not_run(task, &why)]);
@@ -192,7 +192,7 @@ fn run_all(
                     let index = next.fetch_add(1, Ordering::Relaxed);
                     jobs.get(index).map(|job| (index, job))
                 } {
-                    (watch.say)(&format!(
+                    let what = format!(
                         "{} in {}: {} on {}, {} ({} of {})",
                         policy.name,
                         policy.numeric_format.name(),
@@ -201,7 +201,12 @@ fn run_all(
                         job.numbers.name(),
                         index + 1,
                         jobs.len()
-                    ));
+                    );
+                    (watch.say)(Next {
+                        what: &what,
+                        done: index,
+                        all: jobs.len(),
+                    });
                     let analysis = Analysis {
                         folder,
                         policy: &policy.name,

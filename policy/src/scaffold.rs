@@ -361,7 +361,7 @@ signal = [
 #   source         affine in signals, parameters, previous_duty, previous_command: \"v_ref - v_out\"
 #   filters        first to last: [{ delay = 1 }]; also { integrator = { min = -1.0, max = 1.0 } }, { moving_average = 4 },
 #                  { low_pass = { time_constant = 1e-3 } }, { filtered_derivative = { cutoff = 500.0 } },
-#                  \"backward_difference\": (x - the sample before) / sample_period
+#                  \"backward_difference\": (x - the sample before) / sample_period; not divided in your training: scale times sample_period
 #   scale, offset  normalisation of the training: scale * x + offset, 1 and 0 where they are not given
 #   clip           then: [-1.0, 1.0]
 feature = [

@@ -45,6 +45,7 @@ const BASE: TargetSpec = TargetSpec {
     // without FPU a step in floats takes 20 to 45 times as many instructions, and their number depends on the data
     suitable_format: "i16",
     cycles: None,
+    most_per_cycle: None,
     sections: SECTIONS,
     clock_hz: None,
     // four until instructions have been counted with other shapes; where a library computes floats they matter little
@@ -159,7 +160,8 @@ pub const CORTEX_M7: TargetSpec = TargetSpec {
     description: "Arm Cortex-M7 with FPU (Armv7E-M, FPv5-SP)",
     fma: Fma::Cycles { fused: 1, apart: 2 },
     flushes_subnormals: false,
-    // no cycle model: it issues two instructions at a time, of which a count says nothing
+    // no cycle model: it issues two instructions at a time, of which a count says little
+    most_per_cycle: Some(2),
     clock_hz: Some(400_000_000),
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m7", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard"]),

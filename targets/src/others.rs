@@ -20,6 +20,7 @@ pub const HOST: TargetSpec = TargetSpec {
     flushes_subnormals: false,
     suitable_format: "f32",
     cycles: None,
+    most_per_cycle: None,
     sections: GNU_SECTIONS,
     // one that only the user knows
     clock_hz: None,
@@ -62,6 +63,7 @@ pub const DSPACE_DS1202: TargetSpec = TargetSpec {
     suitable_format: "f32",
     // it issues two instructions at a time, of which a count says nothing
     cycles: None,
+    most_per_cycle: None,
     sections: GNU_SECTIONS,
     clock_hz: Some(2_000_000_000),
     // half of the 32 float registers for sums, as on Arm
@@ -111,6 +113,7 @@ pub const C2000_C28X: TargetSpec = TargetSpec {
     // the FPU flushes denormals: bits are promised for integers only
     suitable_format: "i16",
     cycles: None,
+    most_per_cycle: None,
     sections: Sections {
         tables: ".const",
         code: ".text",

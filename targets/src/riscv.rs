@@ -34,6 +34,7 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
     suitable_format: "i16",
     // the tables differ from core to core
     cycles: None,
+    most_per_cycle: None,
     sections: GNU_SECTIONS,
     clock_hz: Some(160_000_000),
     c_row_block: RowBlock::Rows(8),

@@ -211,6 +211,8 @@ pub struct TargetSpec {
     pub suitable_format: &'static str,
     /// Cycles of an instruction mix, where the processor's table is simple enough to say so.
     pub cycles: Option<CycleModel>,
+    /// Instructions that the processor begins in a cycle at most, where its manual says so and there is no cycle model.
+    pub most_per_cycle: Option<u32>,
     /// Where things lie.
     pub sections: Sections,
     /// Clock in Hz of a usual device, for shares of the control period.

@@ -165,6 +165,55 @@ fn arrows(sizes: &[usize]) -> String {
     texts.join(" -> ")
 }
 
+/// A branch may be folded into the instructions beside it, so that a cycle ends more than begin in it: in the loops of a network less
+/// than a tenth of the instructions are branches.
+const FOLDED: f64 = 1.1;
+
+/// What is said where even the most instructions that a processor begins in a cycle are too few for a step in the policy's format.
+fn too_many(
+    policy: &Policy,
+    target: &'static TargetSpec,
+    outputs: &[Output],
+    costs: &StepCosts,
+    clock: Clock,
+) -> Result<Option<String>, CodegenError> {
+    let cycles = clock.hz * policy.sample_period;
+    let least = costs.measured().min_by_key(|costs| costs.instructions_max);
+    let (Some(most), Some(least)) = (target.most_per_cycle, least) else {
+        return Ok(None);
+    };
+    let allowed = FOLDED * f64::from(most);
+    let needed = least.instructions_max as f64 / cycles;
+    if needed <= allowed {
+        return Ok(None);
+    }
+    let mut others_need = Vec::new();
+    for format in others(policy, target) {
+        let policy = policy.clone().with_format(format);
+        let costs = in_format(&policy, target, outputs)?;
+        if let Some(instructions) = costs.measured().map(|costs| costs.instructions_max).min() {
+            let needed = instructions as f64 / cycles;
+            let verdict = if needed > allowed { " (not met)" } else { "" };
+            others_need.push(format!("{} needs {needed:.2}{verdict}", format.name()));
+        }
+    }
+    let others_need = match others_need.is_empty() {
+        true => String::new(),
+        false => format!(
+            "; {}. With --format, a cycle counter on the board says the rest",
+            others_need.join(", ")
+        ),
+    };
+    Ok(Some(format!(
+        "  control period NOT met: {} instructions in the shortest build, {}, are {needed:.2} for each of {} cycles at {clock}, and {} begins \
+         {most} a cycle at most, branches apart{others_need}",
+        grouped(least.instructions_max),
+        least.build,
+        grouped(cycles as u64),
+        target.name
+    )))
+}
+
 /// What can be said without a model: how many cycles there are, and how many instructions, in the other formats as well.
 fn unmodelled(
     policy: &Policy,
@@ -174,6 +223,9 @@ fn unmodelled(
     clock: Clock,
 ) -> Result<String, CodegenError> {
     let cycles = clock.hz * policy.sample_period;
+    if let Some(text) = too_many(policy, target, outputs, costs, clock)? {
+        return Ok(text);
+    }
     let mut text = format!(
         "  cannot be said: no cycles are modelled for {} (`policyc targets` says for which they are); a control period is {} cycles at {clock}",
         target.name,

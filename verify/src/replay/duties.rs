@@ -10,6 +10,9 @@ use super::log::{Done, Log};
 // three digits of a log; neighbours in a table of actions are farther apart
 const SAME: f64 = 5e-3;
 
+/// Most actions that are named one by one: a reader takes in no more.
+const MOST_NAMED: usize = 8;
+
 /// Duties that the log has with its actions, beside those of the contract.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DutyResult {
@@ -212,11 +215,34 @@ fn pairs(of: Logged<'_>) -> Option<(String, bool, Vec<Pair>)> {
 }
 
 impl DutyResult {
+    /// The actions of which the log has no duty, in words: nothing was compared there, and "equal" alone would hide it.
+    fn unseen(&self) -> String {
+        let unseen = (self.logged.iter().enumerate()).filter(|(_, duty)| duty.is_none());
+        let mut names: Vec<String> = unseen.map(|(action, _)| action.to_string()).collect();
+        let more = names.len().saturating_sub(MOST_NAMED);
+        names.truncate(MOST_NAMED);
+        let more = match more {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        match names.as_slice() {
+            [] => String::new(),
+            [one] => format!("; action {one} does not occur: its duty was not compared"),
+            names => format!(
+                "; actions {}{more} do not occur: their duties were not compared",
+                names.join(", ")
+            ),
+        }
+    }
+
     /// What is to be said of the duties; nothing of equal ones that were worked out, since a feature says it.
     pub(super) fn text(&self) -> Option<String> {
         let Some(first) = self.first_line else {
             let is_said = self.rows > 0 && !self.derived;
-            return is_said.then(|| format!("duty of the action equal in {} of {}", self.equal, self.rows));
+            return is_said.then(|| {
+                let unseen = self.unseen();
+                format!("duty of the action equal in {} of {}{unseen}", self.equal, self.rows)
+            });
         };
         let (others, rows) = (self.rows - self.equal, self.rows);
         let seen: Vec<(usize, f64)> = (self.logged.iter().enumerate())

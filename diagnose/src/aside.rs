@@ -118,8 +118,12 @@ pub fn explained_without(
         true => spoilt_later(whole).into_iter().collect(),
         false => parts(whole),
     };
+    let work = &whole.problem.work;
     looks.into_iter().take(LOOKS).find_map(|part| {
-        let mut found = examined(part.taken_from(records), base, say);
+        if !work.goes_on() {
+            return None;
+        }
+        let mut found = examined(part.taken_from(records), base, work, say);
         if !found.named.is_empty() {
             let weak = found.keep_sure(|evidence| evidence.delta_chi2 >= SURE * evidence.threshold);
             found.odd.extend(weak.into_iter().map(|id| {

@@ -28,6 +28,7 @@ use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 use crate::unseen;
 use crate::whiteness;
 use crate::words::{nearest, other_carrier as other_carrier_said, sentence, shifted, si};
+use crate::work::Work;
 use crate::worth::{self, Worth};
 
 /// Everything a report shows.
@@ -68,7 +69,8 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let heldout = &judges[..];
     // a second look begins with the records as they were read
     let kept = train.clone();
-    let mut found = examined(train, &base, say);
+    let work = Work::default();
+    let mut found = examined(train, &base, &work, say);
     let sources = preflight::sources(&found.problem.records, heldout, &found.problem.base);
     say(Progress::Stage("held-out records"));
     let mut pair = found.judged(heldout, &base);
@@ -108,7 +110,13 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     }
     let given = as_given(&found.problem, &base, &mut answer.partial_gain, pair.as_ref());
     let compared = compared::of(&found.problem, &kept, heldout);
-    let notes = answer.notes.into_iter().chain(unused).chain(standing.clone());
+    let notes = answer
+        .notes
+        .into_iter()
+        .chain(unused)
+        .chain(standing.clone())
+        .chain(work.said());
+    eprintln!("WORK {:?}", work);
     let findings = Findings {
         sentence: sentence(&found, &answer.causes, set_aside.as_ref())
             + &answer.near
@@ -158,7 +166,7 @@ fn better(found: &Examined, f_sw: f64) -> (State, f64) {
             let trim = state.starts.trim_or_none(f_sw);
             (
                 state,
-                if is_resolved(&found.attribution, trim) {
+                if is_resolved(&found.attribution, trim) && is_shown(&found.problem, trim) {
                     trim
                 } else {
                     0.0
@@ -172,6 +180,19 @@ fn better(found: &Examined, f_sw: f64) -> (State, f64) {
 fn is_resolved(attribution: &Attribution, trim: f64) -> bool {
     let sd = attribution.basis.trim_sd().unwrap_or(f64::INFINITY);
     trim.abs() > 2.0 * sd * attribution.inflation.sqrt()
+}
+
+/// The channel of the output voltage.
+const OUTPUT_VOLTAGE: usize = 0;
+/// A trim that moves the output voltage by less than this share of the noise of a row is not written into a model.
+// in squares it adds 2 % to the noise, which is the last digit of a figure; a file that has it reads as if the gate were a finding
+const SHOWN: f64 = 0.2;
+
+/// Whether a trim of the edges is more than a line in a file.
+fn is_shown(problem: &Problem, trim: f64) -> bool {
+    let (noise, converter) = (problem.sigma[OUTPUT_VOLTAGE], &problem.base.plant.converter);
+    let node = converter.topology.span(converter.v_in, problem.bases.v);
+    !noise.is_finite() || trim.abs() * node > SHOWN * noise
 }
 
 /// The records that judge, and what is said of captures among them.

@@ -20,6 +20,7 @@ use crate::sampling;
 use crate::shape::{Structure, structures};
 use crate::timing::{self, Timing};
 use crate::unsure_levels;
+use crate::work::Work;
 
 /// What training records say.
 #[derive(Debug)]
@@ -50,11 +51,11 @@ pub struct Examined {
     pub verdict: Verdict,
 }
 
-/// Looks for the causes in `train`.
+/// Looks for the causes in `train`; what it computes counts as `work`.
 #[must_use]
-pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined {
+pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>) -> Examined {
     say(Progress::Stage("noise and initial states"));
-    let (mut problem, mut null, mut outliers) = prepared(train.clone(), base);
+    let (mut problem, mut null, mut outliers) = prepared(train.clone(), base, work);
     let misread = preflight::readings(&problem, &null);
     let mut odd: Vec<String> = misread.iter().map(|one| one.words.clone()).collect();
     if let Some(fault) = preflight::answer(&problem, &misread) {
@@ -64,7 +65,7 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
     match timing::of(&problem, &null) {
         Some(Timing::Other(cause, carrier, said)) => {
             // everything else is sought in the converter that the bench seems to be
-            (problem, null, outliers) = prepared(train, &timing::with(base, carrier));
+            (problem, null, outliers) = prepared(train, &timing::with(base, carrier), work);
             read_off.push(cause);
             odd.push(said);
         }
@@ -249,8 +250,9 @@ fn held_by_data(
 }
 
 /// Noise estimated, outliers masked, initial states fitted.
-fn prepared(train: Vec<Record>, base: &Model) -> (Problem, State, Vec<Outlier>) {
+fn prepared(train: Vec<Record>, base: &Model, work: &Work) -> (Problem, State, Vec<Outlier>) {
     let mut problem = Problem::new(train, base.clone());
+    problem.work = work.clone();
     let mut null = State::settle(&problem, base, &problem.first_starts(), None);
     // noise before the instants of loggers and before outliers, which are judged in its units; and again without the
     // outliers

@@ -70,4 +70,5 @@ mod unseen;
 mod unsure_levels;
 pub mod whiteness;
 mod words;
+mod work;
 pub mod worth;

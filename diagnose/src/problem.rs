@@ -13,6 +13,7 @@ use crate::drive::{Begin, Model, Start, simulate};
 use crate::ideal::{self, Ideal};
 use crate::record::{CHANNELS, Record};
 use crate::slopes::load_steps;
+use crate::work::Work;
 use setup::{bases, cut_unstable, share_source_voltage};
 
 /// What stands in a residual where no number is simulated: far beyond any real error, and its square still a number.
@@ -40,6 +41,8 @@ pub struct Problem {
     pub offsets: Vec<usize>,
     /// The trim is not estimated.
     pub trim_held: bool,
+    /// What is computed with it, and with all others of the same diagnosis.
+    pub(crate) work: Work,
 }
 
 /// What the edges of a gate add to or take from the time that the switch is on, s.
@@ -160,6 +163,7 @@ impl Problem {
             offsets,
             records,
             trim_held: false,
+            work: Work::default(),
         }
     }
 
@@ -271,6 +275,7 @@ impl Problem {
                 out[range].copy_from_slice(&left);
                 continue;
             }
+            self.work.add(model, record);
             let shown = simulate(model, record, &starts.of(index));
             for segment in &record.segments {
                 let first = if record.settled {

@@ -154,11 +154,14 @@ impl Searcher<'_> {
             && best.values.len() < most
             && !self.is_hopeless(&best)
             && !self.is_out_of_reach(&best)
+            && self.fitter.problem.work.goes_on()
         {
             let stage = format!("more than {}", self.names(&best));
             let mut larger = self.forward(&best, LOOKED_AT, &stage);
             // two causes that resemble each other are best found from the one that explains less alone
-            if self.structure(&best) > 0.0 || larger.iter().any(|fit| self.is_worth(&best, fit)) {
+            if (self.structure(&best) > 0.0 || larger.iter().any(|fit| self.is_worth(&best, fit)))
+                && self.fitter.problem.work.goes_on()
+            {
                 for leader in self.distinct(&leaders).into_iter().skip(1).take(LEADERS) {
                     let stage = format!("{} and another", self.names(leader));
                     larger.extend(self.forward(leader, LOOKED_AT_BY_LEADERS, &stage));
@@ -270,6 +273,9 @@ impl Searcher<'_> {
     fn swapped(&self, fit: Fit) -> Fit {
         let mut best = fit;
         for member in 0..best.causes.len() {
+            if !self.fitter.problem.work.goes_on() {
+                break;
+            }
             let stage = format!("another cause for {}", self.id(best.causes[member]));
             for other in self.replacements(&best, member, 3, &stage) {
                 if self.score(&other) < self.score(&best) - SWAP {

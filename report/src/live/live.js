@@ -34,6 +34,13 @@
     return ticks.map(value => value === null ? "" : value.toFixed(digits).replace(/^-(?=[0.]*[1-9])/, "−").replace(/^-/, ""));
   };
 
+  // px between ticks of a horizontal axis: a label of 12 px, whose decimals are those of a tenth of what is shown, and a gap
+  const roomFor = (plot, axis, low, high) => {
+    const decimals = Math.max(0, Math.ceil(1 - Math.log10(high - low || 1)));
+    const longest = Math.max(low.toFixed(Math.min(decimals, 9)).length, high.toFixed(Math.min(decimals, 9)).length);
+    return Math.max(50, 7 * longest + 16);
+  };
+
   // lowest and highest value within a stretch of x; nothing where there is none
   const extent = (x, columns, from, to) => {
     let low = Infinity, high = -Infinity;
@@ -255,7 +262,7 @@
         legend: { show: false },
         cursor: { sync: { key: this.key, setSeries: false }, drag: { x: true, y: false, dist: 4 }, points: { size: 6 } },
         scales: { x: { time: false, range: (_, low, high) => [low ?? this.x.low, high ?? this.x.high] }, y: { range: height } },
-        axes: [{ ...axis, size: isLast ? 30 : 6, values: (_, ticks, __, ___, step) => isLast ? labels(ticks, step) : ticks.map(() => "") },
+        axes: [{ ...axis, size: isLast ? 30 : 6, space: roomFor, values: (_, ticks, __, ___, step) => isLast ? labels(ticks, step) : ticks.map(() => "") },
           { ...axis, size: this.side, values: (_, ticks, __, ___, step) => labels(ticks, step) }],
         series,
         bands,

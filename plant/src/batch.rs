@@ -78,11 +78,12 @@ impl Batch {
 
     /// One control period of every converter; `duties` and `loads` have one element each.
     pub fn step(&mut self, duties: &[f64], loads: &[Load]) {
-        let whole = self.len() - self.len() % LANES;
-        for first in (0..whole).step_by(LANES) {
-            self.step_lanes(first, duties, loads);
-        }
-        for index in whole..self.len() {
+        wide::widest(Period {
+            batch: self,
+            duties,
+            loads,
+        });
+        for index in self.len() - self.len() % LANES..self.len() {
             self.step_one(index, duties[index], &loads[index]);
         }
     }
@@ -128,6 +129,8 @@ impl Batch {
         (self.i_l[index], self.v_out[index]) = (sample.i_l, sample.v_out);
     }
 
+    // apart: of the way alone no lane gains anything
+    #[inline(never)]
     fn step_one(&mut self, index: usize, duty: f64, load: &Load) {
         let plant = &mut self.plants[index];
         (plant.state.x[0], plant.state.x[1]) = (self.i_l[index], self.v_out[index]);
@@ -135,6 +138,7 @@ impl Batch {
         (self.i_l[index], self.v_out[index]) = (sample.i_l, sample.v_out);
     }
 
+    #[inline(always)]
     fn step_lanes(&mut self, first: usize, duties: &[f64], loads: &[Load]) {
         let (duties, loads) = (&duties[first..first + LANES], &loads[first..first + LANES]);
         let group = &self.groups[first / LANES];
@@ -170,6 +174,24 @@ impl Batch {
             } else {
                 self.step_one(first + n, duties[n], &loads[n]);
             }
+        }
+    }
+}
+
+/// A control period of the converters that fill groups.
+struct Period<'a> {
+    batch: &'a mut Batch,
+    duties: &'a [f64],
+    loads: &'a [Load],
+}
+
+impl wide::Work for Period<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for first in (0..self.batch.groups.len()).map(|group| group * LANES) {
+            self.batch.step_lanes(first, self.duties, self.loads);
         }
     }
 }

@@ -9,10 +9,12 @@ use crate::checkpoint::{Reader, Writer, other};
 use crate::faults::Error;
 use crate::score::Score;
 use crate::trainer::{Best, Look, Sums, Trainer};
+use crate::trials::Order;
 use closed_loop::environment::Environment;
 
 impl<E: Environment> Trainer<E> {
-    /// The whole training: networks, optimiser, replay, random numbers, plant, filters, curve, best policy.
+    /// The whole training: networks, optimiser, replay, random numbers, plant, filters, curve, best policy, order of
+    /// the trials.
     ///
     /// # Errors
     /// If the plant's state cannot be written down.
@@ -61,6 +63,8 @@ impl<E: Environment> Trainer<E> {
             to.f64(best.score.cost);
             to.floats(&best.network.parameters);
         }
+        to.u64(self.order.0.len() as u64);
+        to.words(&self.order.0);
         Ok(to.finish())
     }
 
@@ -145,6 +149,15 @@ impl<E: Environment> Trainer<E> {
             let mut network = self.learner.online.clone();
             from.floats_into(&mut network.parameters)?;
             self.best = Some(Best { step, score, network });
+        }
+        let count = from.count()?;
+        // before so many are read: the trials are those of the training file
+        if count != self.trial_count() {
+            return Err(other());
+        }
+        self.order = Order((0..count).map(|_| from.u64()).collect::<Result<_, _>>()?);
+        if !self.order.holds_all(count) {
+            return Err(other());
         }
         Ok(())
     }

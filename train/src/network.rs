@@ -275,6 +275,8 @@ impl wide::Work for Act<'_> {
             let mut at = 0;
             at = add_products::<64>(weights, x, y, at);
             at = add_products::<16>(weights, x, y, at);
+            at = add_products::<8>(weights, x, y, at);
+            at = add_products::<4>(weights, x, y, at);
             add_products::<1>(weights, x, y, at);
             interp::activate(layer.activation, y.iter_mut());
             std::mem::swap(x, y);

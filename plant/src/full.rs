@@ -202,7 +202,7 @@ impl Full {
         let count = (h * self.rate.max(far)).ceil().max(1.0);
         let step = h / count;
         let has_lags = self.low_pass != [0.0; 4];
-        let whole = lag::of_sensors(step, &self.low_pass);
+        let whole = has_lags.then(|| lag::of_sensors(step, &self.low_pass));
         let mut before = algebra(&x, t);
         extend(track, &before.signals, path);
         let mut used = 0.0;
@@ -227,11 +227,11 @@ impl Full {
             if let Some(v) = vertex(before.signals.v_out, mid.v_out, after.signals.v_out) {
                 track.voltage(v);
             }
-            if has_lags {
+            if let Some(whole) = &whole {
                 // a crossing has shortened the step
                 let cut = (length != step).then(|| lag::of_sensors(length, &self.low_pass));
                 let shown = [&before.signals, &mid, &after.signals];
-                lag::follow(&mut states[SHOWN..], cut.as_ref().unwrap_or(&whole), shown);
+                lag::follow(&mut states[SHOWN..], cut.as_ref().unwrap_or(whole), shown);
             }
             used += length;
             if crossed {

@@ -9,12 +9,12 @@ use crate::checkpoint::{Reader, Writer, other};
 use crate::faults::Error;
 use crate::score::Score;
 use crate::trainer::{Best, Look, Sums, Trainer};
-use crate::trials::Order;
+use crate::trials::Told;
 use closed_loop::environment::Environment;
 
 impl<E: Environment> Trainer<E> {
-    /// The whole training: networks, optimiser, replay, random numbers, plant, filters, curve, best policy, order of
-    /// the trials.
+    /// The whole training: networks, optimiser, replay, random numbers, plant, filters, curve, best policy, what the
+    /// trials told.
     ///
     /// # Errors
     /// If the plant's state cannot be written down.
@@ -63,8 +63,8 @@ impl<E: Environment> Trainer<E> {
             to.f64(best.score.cost);
             to.floats(&best.network.parameters);
         }
-        to.u64(self.order.0.len() as u64);
-        to.words(&self.order.0);
+        to.u64(self.told.0.len() as u64);
+        to.numbers(&self.told.0);
         Ok(to.finish())
     }
 
@@ -155,10 +155,7 @@ impl<E: Environment> Trainer<E> {
         if count != self.trial_count() {
             return Err(other());
         }
-        self.order = Order((0..count).map(|_| from.u64()).collect::<Result<_, _>>()?);
-        if !self.order.holds_all(count) {
-            return Err(other());
-        }
+        self.told = Told((0..count).map(|_| from.f64()).collect::<Result<_, _>>()?);
         Ok(())
     }
 

@@ -19,32 +19,35 @@ use crate::network::Network;
 use crate::score::{Score, Scoring};
 use crate::trainer::Trainer;
 
-/// The order of the trials of the coming look: indices into all of them.
+/// How much each trial told in the looks so far, as a share of the cost that rules a network out.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Order(pub Vec<u64>);
+pub(crate) struct Told(pub Vec<f64>);
 
-impl Order {
-    /// One instant of each load step first, in the order of the file: what fails there needs none of the others.
+/// What a look leaves of what the looks before it said of a trial.
+// networks change slowly, but which of two neighbouring instants is the worse one changes from look to look
+const KEPT: f64 = 0.7;
+/// What a trial that told nothing loses beside it, so that one which was never run comes before it.
+const VAIN: f64 = 1e-6;
+
+impl Told {
+    /// Nothing of so many.
     pub fn new(count: usize) -> Self {
-        Self((0..count as u64).collect())
+        Self(vec![0.0; count])
     }
 
-    /// Whether each of `count` trials is in it, once.
-    pub fn holds_all(&self, count: usize) -> bool {
-        let mut sorted = self.0.clone();
-        sorted.sort_unstable();
-        sorted.into_iter().eq(0..count as u64)
+    /// The trials, the most telling first; of equal ones one instant of each load step before the next instant.
+    fn order(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.0.len()).collect();
+        order.sort_by(|&a, &b| self.0[b].total_cmp(&self.0[a]));
+        order
     }
 
-    /// What raised the bound comes first, the largest rise in front; then what was not run; last what was run in vain.
-    fn learn(&mut self, rises: &[f64]) {
-        let mut ran: Vec<(u64, f64)> = self.0.iter().copied().zip(rises.iter().copied()).collect();
-        let (vain, mut telling): (Vec<_>, Vec<_>) = ran.drain(..).partition(|(_, rise)| *rise <= 0.0);
-        // stable: of equal rises the order of before
-        telling.sort_by(|(_, a), (_, b)| b.total_cmp(a));
-        let others = self.0[rises.len()..].iter().copied();
-        let order = telling.iter().map(|(trial, _)| *trial).chain(others);
-        self.0 = order.chain(vain.iter().map(|(trial, _)| *trial)).collect();
+    /// Takes in by which share of the cost a trial raised the bound.
+    fn learn(&mut self, trial: usize, share: f64) {
+        // a network that is lost is beyond every cost
+        let share = share.clamp(0.0, 1.0);
+        let kept = KEPT * self.0[trial] + (1.0 - KEPT) * share;
+        self.0[trial] = if share > 0.0 { kept } else { kept - VAIN };
     }
 }
 
@@ -75,12 +78,18 @@ impl<E: Environment> Trainer<E> {
 
     /// The score of a network on the selection scenarios. One that cannot be better than the best is not run through the rest,
     /// and its cost is a lower bound.
-    pub(crate) fn judge(&self, network: &Network, order: &mut Order) -> Result<Score, Error> {
+    pub(crate) fn judge(&self, network: &Network, told: &mut Told) -> Result<Score, Error> {
         let (selection, v_ref) = (&self.settings.selection, self.settings.reward.v_ref);
         let task = &selection.task;
         let steps: Vec<LoadStep> = task.load_steps.iter().map(|&step| step.into()).collect();
         let controller = quick_controller(&self.contract, network)?;
         let best = self.best.as_ref().map_or(f64::INFINITY, |best| best.score.cost);
+        // of the first network that is judged: the cost of one that just holds
+        let whole = if best.is_finite() {
+            best.max(f64::MIN_POSITIVE)
+        } else {
+            1.0
+        };
         let (instants, places) = (task.all_instants(), self.places());
         let mut standings: Vec<Standing<'_>> = places
             .iter()
@@ -91,9 +100,8 @@ impl<E: Environment> Trainer<E> {
             .collect();
         // steps from the same load have one lead
         let mut leads: Vec<((usize, f64), Lead<'_, Varied<E>, _>)> = Vec::new();
-        let (mut rises, mut bound) = (Vec::new(), so_far(&standings));
-        for trial in &order.0 {
-            let trial = *trial as usize;
+        let mut bound = so_far(&standings);
+        for trial in told.order() {
             let (step_at, place_at) = (trial % steps.len(), trial / steps.len() % places.len());
             let instant = instants[trial / (steps.len() * places.len())];
             let step = steps[step_at];
@@ -112,11 +120,17 @@ impl<E: Environment> Trainer<E> {
                 standings[place_at].findings[step_at].add(instant, *metrics);
                 so_far(&standings)
             };
-            let metrics = leads[lead]
-                .1
-                .run(&step, instant, |metrics| bound_with(metrics).cost < best)?;
+            let mut asked = Metrics::default();
+            let metrics = leads[lead].1.run(&step, instant, |metrics| {
+                // most periods change nothing, and the bound of all load steps costs as much as some of them
+                let grown = metrics.deviation > asked.deviation
+                    || metrics.settling > asked.settling
+                    || metrics.tail_max > asked.tail_max;
+                asked = *metrics;
+                !grown || bound_with(metrics).cost < best
+            })?;
             let with = bound_with(&metrics);
-            rises.push(with.cost - bound.cost);
+            told.learn(trial, (with.cost - bound.cost) / whole);
             bound = with;
             if bound.cost >= best {
                 // cut short, so nothing can be said of the rest
@@ -124,7 +138,6 @@ impl<E: Environment> Trainer<E> {
                 break;
             }
         }
-        order.learn(&rises);
         Ok(bound)
     }
 }
@@ -135,8 +148,10 @@ mod tests {
 
     #[test]
     fn what_told_most_comes_first_and_what_told_nothing_last() {
-        let mut order = Order(vec![4, 1, 0, 3, 2]);
-        order.learn(&[0.0, 1.0, 2.0]);
-        assert_eq!(order.0, [0, 1, 3, 2, 4]);
+        let mut told = Told::new(4);
+        for (trial, share) in [(2, 0.5), (1, f64::INFINITY), (0, 0.0)] {
+            told.learn(trial, share);
+        }
+        assert_eq!(told.order(), [1, 2, 3, 0]);
     }
 }

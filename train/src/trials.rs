@@ -99,29 +99,31 @@ impl<E: Environment> Trainer<E> {
             })
             .collect();
         // steps from the same load have one lead
-        let mut leads: Vec<((usize, f64), Lead<'_, Varied<E>, _>)> = Vec::new();
+        let mut known: Vec<(usize, f64)> = Vec::new();
+        let mut leads: Vec<Lead<'_, Varied<E>, _>> = Vec::new();
         let mut bound = so_far(&standings);
         for trial in told.order() {
             let (step_at, place_at) = (trial % steps.len(), trial / steps.len() % places.len());
             let instant = instants[trial / (steps.len() * places.len())];
             let step = steps[step_at];
             let key = (place_at, step.values[0]);
-            let lead = match leads.iter().position(|(known, _)| *known == key) {
+            let lead = match known.iter().position(|other| *other == key) {
                 Some(at) => at,
                 None => {
                     let converter = &places[place_at].converter;
-                    leads.push((key, Lead::new(converter, &controller, v_ref, task, &step)?));
+                    leads.push(Lead::new(converter, &controller, v_ref, task, &step)?);
+                    known.push(key);
                     leads.len() - 1
                 }
             };
-            let known = standings[place_at].findings[step_at];
+            let before = standings[place_at].findings[step_at];
             let mut bound_with = |metrics: &Metrics| {
-                standings[place_at].findings[step_at] = known;
+                standings[place_at].findings[step_at] = before;
                 standings[place_at].findings[step_at].add(instant, *metrics);
                 so_far(&standings)
             };
             let mut asked = Metrics::default();
-            let metrics = leads[lead].1.run(&step, instant, |metrics| {
+            let metrics = leads[lead].run(&step, instant, |metrics| {
                 // most periods change nothing, and the bound of all load steps costs as much as some of them
                 let grown = metrics.deviation > asked.deviation
                     || metrics.settling > asked.settling

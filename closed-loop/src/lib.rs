@@ -16,6 +16,7 @@ mod course;
 pub mod design;
 pub mod environment;
 mod faults;
+mod lead;
 pub mod limit;
 mod load_step;
 mod map;

@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::chatter::Chatter;
 use crate::environment::{Environment, LoadPath, Start};
 use crate::faults::Error;
+pub use crate::lead::{Lead, survey, survey_all};
 use crate::load_step::{LoadKind, LoadStep};
 
 /// Half width of the band that settling refers to, V: half a percent of the reference, the 0.5 V of the paper's 100 V.
@@ -151,10 +152,14 @@ pub struct Record {
     pub load: Load,
 }
 
+/// Control periods from one question whether a run is to go on to the next.
+// the question costs about as much as one of them
+const BETWEEN_QUESTIONS: usize = 8;
+
 /// A converter in closed loop with a controller, about to see a load step.
 #[derive(Debug, Clone)]
 pub struct Loop<E, C> {
-    environment: E,
+    pub(crate) environment: E,
     controller: C,
     sample: Sample,
     load: Load,
@@ -250,12 +255,18 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
     /// Runs `after` periods from there; the last `tail` of them are the tail.
     ///
     /// [`Loop::last_before`] comes before it.
-    pub fn measure(
+    pub fn measure(&mut self, to: Load, phase: f64, after: usize, tail: usize, record: impl FnMut(Record)) -> Metrics {
+        self.measure_while((to, phase), after, tail, |_| true, record)
+    }
+
+    /// [`Loop::measure`], asked every few periods whether it is to go on. The figures so far are none of them above those of the
+    /// whole run; what is told of the tail as a whole stays at 0 if the run is ended.
+    pub fn measure_while(
         &mut self,
-        to: Load,
-        phase: f64,
+        (to, phase): (Load, f64),
         after: usize,
         tail: usize,
+        mut go_on: impl FnMut(&Metrics) -> bool,
         mut record: impl FnMut(Record),
     ) -> Metrics {
         let t_sample = self.environment.t_sample();
@@ -295,6 +306,9 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
                 ripple += self.sample.v_max - self.sample.v_min;
                 duties.push(duty);
                 currents.push(self.sample.i_l);
+            }
+            if (n + 1) % BETWEEN_QUESTIONS == 0 && !go_on(&metrics) {
+                return metrics;
             }
         }
         metrics.tail_mean = (sum / tail as f64).abs();
@@ -377,69 +391,4 @@ where
         record.time = (record.time - zero) * t_sample;
     }
     Ok((metrics, records))
-}
-
-/// Runs one load step at the given instants of `task`; the lead is run once and every instant goes on from a copy.
-///
-/// # Errors
-/// If the converter cannot be started, or one from outside fails.
-pub fn survey<E, C>(
-    environment: &E,
-    controller: &C,
-    v_ref: f64,
-    task: &Task,
-    load_step: impl Into<LoadStep>,
-    instants: &[Instant],
-) -> Result<Finding, Error>
-where
-    E: Environment,
-    C: FnMut(&Sample) -> f64 + Clone,
-{
-    let quiet = |_: Record| {};
-    let step = load_step.into();
-    let [from, to] = step.loads();
-    let before = step.source.map(|[before, _]| before);
-    let mut run = Loop::start(
-        environment.clone(),
-        controller.clone(),
-        step.held(v_ref)[0],
-        from,
-        before,
-    )?;
-    run.lead(task.lead - 1, task.tail, quiet);
-    let mut finding = Finding::new(step);
-    let last = instants.iter().map(|instant| instant.periods).max().unwrap_or(0);
-    for period in 0..=last {
-        for instant in instants.iter().filter(|instant| instant.periods == period) {
-            // from here on every instant has a run of its own; the lead is common to all
-            let mut run = run.clone();
-            let phase = step.phase(instant.phase);
-            run.last_before(to, phase, task.tail, quiet);
-            run.disturb(&step)?;
-            let metrics = run.measure(to, phase, task.after, task.tail, quiet);
-            run.environment.failure().map_or(Ok(()), Err)?;
-            finding.add(*instant, metrics);
-        }
-        run.lead(1, task.tail, quiet);
-    }
-    Ok(finding)
-}
-
-/// All load steps of a task.
-///
-/// # Errors
-/// If the converter cannot be started, or one from outside fails.
-pub fn survey_all<E, C>(
-    environment: &E,
-    controller: &C,
-    v_ref: f64,
-    task: &Task,
-    instants: &[Instant],
-) -> Result<Vec<Finding>, Error>
-where
-    E: Environment,
-    C: FnMut(&Sample) -> f64 + Clone,
-{
-    let one = |&load_step| survey(environment, controller, v_ref, task, load_step, instants);
-    task.load_steps.iter().map(one).collect()
 }

@@ -6,7 +6,7 @@ use toml_input::{Fault, Faults, Message};
 
 use crate::effects::{duty_offset, duty_quantisation, load_setting, minimum_on_time};
 use crate::entry::Way;
-use crate::parameters::{LoadBox, Parameters, Pwm};
+use crate::parameters::{Parameters, Pwm};
 use crate::plain::{All, Give, LARGEST_CHANGE, LONGEST_STEP, Number, ORDER, Part, TERM_BEFORE, series, sum};
 use crate::plant::Plant;
 use crate::signals::{Load, Signals};
@@ -78,11 +78,12 @@ impl Batch {
 
     /// One control period of every converter; `duties` and `loads` have one element each.
     pub fn step(&mut self, duties: &[f64], loads: &[Load]) {
-        let whole = self.len() - self.len() % LANES;
-        for first in (0..whole).step_by(LANES) {
-            self.step_lanes(first, duties, loads);
-        }
-        for index in whole..self.len() {
+        wide::widest(Period {
+            batch: self,
+            duties,
+            loads,
+        });
+        for index in self.len() - self.len() % LANES..self.len() {
             self.step_one(index, duties[index], &loads[index]);
         }
     }
@@ -128,6 +129,8 @@ impl Batch {
         (self.i_l[index], self.v_out[index]) = (sample.i_l, sample.v_out);
     }
 
+    // apart: of the way alone no lane gains anything
+    #[inline(never)]
     fn step_one(&mut self, index: usize, duty: f64, load: &Load) {
         let plant = &mut self.plants[index];
         (plant.state.x[0], plant.state.x[1]) = (self.i_l[index], self.v_out[index]);
@@ -135,6 +138,7 @@ impl Batch {
         (self.i_l[index], self.v_out[index]) = (sample.i_l, sample.v_out);
     }
 
+    #[inline(always)]
     fn step_lanes(&mut self, first: usize, duties: &[f64], loads: &[Load]) {
         let (duties, loads) = (&duties[first..first + LANES], &loads[first..first + LANES]);
         let group = &self.groups[first / LANES];
@@ -163,13 +167,37 @@ impl Batch {
                 group.diode,
             );
         }
+        // a lane that is not regular may hold nonsense; `i_l` and `v_out` still have the start of the period
+        let regular = lanes.regular;
+        if regular.iter().fold(1, |all, lane| all & lane) == 1 {
+            self.i_l[first..first + LANES].copy_from_slice(&lanes.i.0);
+            self.v_out[first..first + LANES].copy_from_slice(&lanes.v.0);
+            return;
+        }
         for n in 0..LANES {
-            // a lane that is not regular may hold nonsense; `i_l` and `v_out` still have the start of the period
-            if lanes.regular[n] {
+            if regular[n] == 1 {
                 (self.i_l[first + n], self.v_out[first + n]) = (lanes.i.0[n], lanes.v.0[n]);
             } else {
                 self.step_one(first + n, duties[n], &loads[n]);
             }
+        }
+    }
+}
+
+/// A control period of the converters that fill groups.
+struct Period<'a> {
+    batch: &'a mut Batch,
+    duties: &'a [f64],
+    loads: &'a [Load],
+}
+
+impl wide::Work for Period<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for first in (0..self.batch.groups.len()).map(|group| group * LANES) {
+            self.batch.step_lanes(first, self.duties, self.loads);
         }
     }
 }
@@ -239,8 +267,12 @@ struct Group {
     all: bool,
     /// 1 where a diode ends the current.
     diode: Lane,
-    load: [LoadBox; LANES],
+    resistor_gain: Lane,
+    bleed: Lane,
+    setting_gain: Lane,
     pwm: [Pwm; LANES],
+    /// The modulator of every lane gives the duty that is commanded.
+    exact: bool,
 }
 
 impl Group {
@@ -270,7 +302,13 @@ impl Group {
             emf_off: lane(&|p| off(p).emf),
             r_off: lane(&|p| off(p).r),
             diode: lane(&|p| if p.legs.synchronous { 0.0 } else { 1.0 }),
-            load: std::array::from_fn(|n| plants[n].parameters().load.clone()),
+            resistor_gain: lane(&|p| p.parameters().load.resistor_gain),
+            bleed: lane(&|p| p.parameters().load.bleed),
+            setting_gain: lane(&|p| p.parameters().load.setting_gain),
+            exact: plants.iter().all(|plant| {
+                let pwm = &plant.parameters().pwm;
+                pwm.duty_offset == 0.0 && pwm.duty_lsb == 0.0 && pwm.min_on_time == 0.0
+            }),
             pwm: std::array::from_fn(|n| plants[n].parameters().pwm.clone()),
         }
     }
@@ -284,33 +322,38 @@ struct Lanes {
     conductance: Lane,
     current: Lane,
     power: Lane,
-    regular: [bool; LANES],
+    /// 1 or 0: as wide as a lane, so that what asks for it is computed side by side as well.
+    regular: [u64; LANES],
 }
 
 impl Lanes {
     #[inline(always)]
     fn new(group: &Group, duties: &[f64], loads: &[Load]) -> Self {
-        let zero = Lane([0.0; LANES]);
-        let mut lanes = Lanes {
-            i: zero,
-            v: zero,
-            on: zero,
-            conductance: zero,
-            current: zero,
-            power: zero,
-            regular: [true; LANES],
-        };
+        let (mut conductance, mut current, mut power) = (Lane::of(0.0), Lane::of(0.0), Lane::of(0.0));
+        let mut duty = Lane::of(0.0);
         for n in 0..LANES {
-            let drawn = load_setting::drawn(&group.load[n], &loads[n]);
-            lanes.conductance.0[n] = drawn.conductance;
-            lanes.current.0[n] = drawn.current;
-            lanes.power.0[n] = drawn.power;
-            let (pwm, t_sw) = (&group.pwm[n], group.t_sw.0[n]);
-            let duty = if duties[n] > 0.0 { duties[n].min(1.0) } else { 0.0 };
-            let shifted = duty_offset::shift(duty, pwm);
-            lanes.on.0[n] = minimum_on_time::limit(duty_quantisation::round(shifted, pwm.duty_lsb), pwm, t_sw) * t_sw;
+            conductance.0[n] = loads[n].conductance;
+            current.0[n] = loads[n].current;
+            power.0[n] = loads[n].power;
+            duty.0[n] = if duties[n] > 0.0 { duties[n].min(1.0) } else { 0.0 };
         }
-        lanes
+        if !group.exact {
+            for n in 0..LANES {
+                let (pwm, t_sw) = (&group.pwm[n], group.t_sw.0[n]);
+                let shifted = duty_offset::shift(duty.0[n], pwm);
+                duty.0[n] = minimum_on_time::limit(duty_quantisation::round(shifted, pwm.duty_lsb), pwm, t_sw);
+            }
+        }
+        Lanes {
+            i: Lane::of(0.0),
+            v: Lane::of(0.0),
+            on: duty * group.t_sw,
+            // `load_setting::drawn` lane by lane
+            conductance: conductance * group.resistor_gain + group.bleed,
+            current: current * group.setting_gain,
+            power: power * group.setting_gain,
+            regular: [1; LANES],
+        }
     }
 
     #[inline(always)]
@@ -319,11 +362,8 @@ impl Lanes {
         let mut w0 = Lane([0.0; LANES]);
         for n in 0..LANES {
             // 1 / v0 at a voltage of 0 would bring 0 * inf, a NaN, into a lane without constant power
-            w0.0[n] = if v0.0[n] < group.v_fold.0[n] {
-                0.0
-            } else {
-                1.0 / v0.0[n]
-            };
+            let inverse = 1.0 / v0.0[n];
+            w0.0[n] = if v0.0[n] < group.v_fold.0[n] { 0.0 } else { inverse };
         }
         let (a, b) = (h * group.inv_l, h * group.inv_c);
         let load = [self.conductance, self.current, power];
@@ -333,12 +373,12 @@ impl Lanes {
         for n in 0..LANES {
             let fold = group.v_fold.0[n];
             // the conditions of `Plain::leaf`, so that a lane that passes has the bits of a plant alone
-            let steady = v[1].0[n].abs() <= LARGEST_CHANGE * v0.0[n] && v0.0[n] >= fold && self.v.0[n] >= fold;
+            let steady = (v[1].0[n].abs() <= LARGEST_CHANGE * v0.0[n]) & (v0.0[n] >= fold) & (self.v.0[n] >= fold);
             let smooth = (power.0[n] == 0.0) | steady;
             let short = (h.0[n] <= group.longest.0[n]) & (rate.0[n] <= LONGEST_STEP);
             let flows = (diode.0[n] == 0.0) | ((i0.0[n] > 0.0) & (self.i.0[n] > 0.0));
             let last = v[ORDER].0[n].abs() + TERM_BEFORE * v[ORDER - 1].0[n].abs();
-            self.regular[n] &= smooth & short & flows & (last <= group.last_term.0[n]);
+            self.regular[n] &= u64::from(smooth & short & flows & (last <= group.last_term.0[n]));
         }
     }
 }

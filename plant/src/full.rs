@@ -17,9 +17,11 @@
 //! sensors, which nothing here depends on: [`lag`] moves them on behind each step.
 
 mod algebra;
+mod few;
 
 use serde::{Deserialize, Serialize};
 
+use self::few::Few;
 use crate::lag;
 use crate::parameters::Parameters;
 use crate::plain::Track;
@@ -41,6 +43,8 @@ const SHOWN: usize = 7;
 /// States of a circuit with inductor and output capacitor alone. Loops over the others, which stand still there, and the branches
 /// for parts that are not there took more than half of the time of a converter with an ESR.
 const FEW: usize = V_C + 1;
+/// With a cable, and nothing beyond it.
+const WIRED: usize = V_LOAD + 1;
 
 /// The states: inductance current, capacitor voltage, cable, load, source, four low-passes.
 pub(crate) type States = [f64; STATES];
@@ -76,6 +80,8 @@ pub(crate) struct Full {
     has_lag: bool,
     /// A state beyond [`FEW`] changes.
     has_many: bool,
+    /// None beyond [`WIRED`] does.
+    is_wired: bool,
     /// 1 / L, 1 / C of parts that change with neither current nor voltage.
     linear: [Option<f64>; 2],
     low_pass: [f64; 4],
@@ -108,6 +114,7 @@ impl Full {
             has_c_in: has_c_in(p),
             has_lag,
             has_many: has_cable || has_lag || has_c_in(p),
+            is_wired: has_cable && !has_lag && !has_c_in(p),
             low_pass,
             rate: rate::fastest(p).1,
         }
@@ -156,13 +163,28 @@ impl Full {
     /// Advances by `h` seconds from time `t`, or until the current reaches 0 if the path stops there, or an open leg
     /// begins to conduct. Returns the time used.
     pub fn advance(&self, x: &mut States, path: &Path, load: &Load, span: (f64, f64), track: &mut Track) -> f64 {
+        if let Some(few) = Few::new(self, path, load) {
+            return match few.is_whole() {
+                true => self.advance_first(x, path, load, span, track, |x, _| few.algebra::<true>(x)),
+                false => self.advance_first(x, path, load, span, track, |x, _| few.algebra::<false>(x)),
+            };
+        }
+        if self.is_wired {
+            let algebra = |x: &[f64; WIRED], t: f64| self.algebra(x, path, load, t);
+            return self.advance_first(x, path, load, span, track, algebra);
+        }
         match self.has_many {
-            true => self.advance_first::<SHOWN>(x, path, load, span, track),
-            false => self.advance_first::<FEW>(x, path, load, span, track),
+            true => self.advance_first(x, path, load, span, track, |x: &[f64; SHOWN], t| {
+                self.algebra(x, path, load, t)
+            }),
+            false => self.advance_first(x, path, load, span, track, |x: &[f64; FEW], t| {
+                self.algebra(x, path, load, t)
+            }),
         }
     }
 
-    /// [`Full::advance`] where the states behind the first `N` stand still.
+    /// [`Full::advance`] where the states behind the first `N` stand still, and `algebra` gives what follows from states and time.
+    #[inline(always)]
     fn advance_first<const N: usize>(
         &self,
         states: &mut States,
@@ -170,6 +192,7 @@ impl Full {
         load: &Load,
         span: (f64, f64),
         track: &mut Track,
+        algebra: impl Fn(&[f64; N], f64) -> Algebra<N> + Copy,
     ) -> f64 {
         let (t, h) = span;
         let mut x = first::<N>(states);
@@ -178,14 +201,15 @@ impl Full {
         // at least one step: an interval of length 0 would be 0 / 0
         let count = (h * self.rate.max(far)).ceil().max(1.0);
         let step = h / count;
-        let whole = lag::of_sensors(step, &self.low_pass);
-        let mut before = self.algebra(&x, path, load, t);
+        let has_lags = self.low_pass != [0.0; 4];
+        let whole = has_lags.then(|| lag::of_sensors(step, &self.low_pass));
+        let mut before = algebra(&x, t);
         extend(track, &before.signals, path);
         let mut used = 0.0;
         for _ in 0..count as u64 {
             let start = x;
-            x = self.step(&start, &before, path, load, t + used, step);
-            let mut after = self.algebra(&x, path, load, t + used + step);
+            x = runge_kutta(algebra, &start, &before, t + used, step);
+            let mut after = algebra(&x, t + used + step);
             let mut length = step;
             let crossed = path.only != 0.0 && left(&after, path) <= 0.0;
             // the diode has no current to begin with: no time is used, and the caller goes on with an open leg
@@ -194,20 +218,20 @@ impl Full {
                 x = start;
                 after = before;
             } else if crossed {
-                length = self.crossing(&start, &before, path, load, (t + used, step), left(&after, path));
-                x = self.step(&start, &before, path, load, t + used, length);
-                after = self.algebra(&x, path, load, t + used + length);
+                length = crossing(algebra, &start, &before, path, (t + used, step), left(&after, path));
+                x = runge_kutta(algebra, &start, &before, t + used, length);
+                after = algebra(&x, t + used + length);
             }
             let middle = between(&start, &x, &before.slopes, &after.slopes, length);
-            let mid = self.algebra(&middle, path, load, t + used + 0.5 * length).signals;
+            let mid = algebra(&middle, t + used + 0.5 * length).signals;
             if let Some(v) = vertex(before.signals.v_out, mid.v_out, after.signals.v_out) {
                 track.voltage(v);
             }
-            if self.low_pass != [0.0; 4] {
+            if let Some(whole) = &whole {
                 // a crossing has shortened the step
                 let cut = (length != step).then(|| lag::of_sensors(length, &self.low_pass));
                 let shown = [&before.signals, &mid, &after.signals];
-                lag::follow(&mut states[SHOWN..], cut.as_ref().unwrap_or(&whole), shown);
+                lag::follow(&mut states[SHOWN..], cut.as_ref().unwrap_or(whole), shown);
             }
             used += length;
             if crossed {
@@ -224,64 +248,64 @@ impl Full {
         }
         h
     }
+}
 
-    /// When nothing is `left` of what keeps the path, by the Illinois method.
-    fn crossing<const N: usize>(
-        &self,
-        x: &[f64; N],
-        a: &Algebra<N>,
-        path: &Path,
-        load: &Load,
-        span: (f64, f64),
-        end: f64,
-    ) -> f64 {
-        let (t, h) = span;
-        let (mut low, mut high) = ((0.0, left(a, path)), (h, end));
-        // a bound alone: the tests take 8 turns at most, and as many halvings end at 1e-12 of the step
-        for _ in 0..40 {
-            let guess = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
-            let inside = guess > low.0.min(high.0) && guess < low.0.max(high.0);
-            if !inside || (high.0 - low.0).abs() < 1e-15 * h {
-                break;
-            }
-            let state = self.step(x, a, path, load, t, guess);
-            let i = left(&self.algebra(&state, path, load, t + guess), path);
-            if i * high.1 < 0.0 {
-                low = high;
-            } else {
-                // the Illinois rule: plain regula falsi would keep this end for ever on a curve that bends one way
-                low.1 *= 0.5;
-            }
-            high = (guess, i);
-            // rounding of a current of amperes, 1e-16 of it, a thousand times
-            if i.abs() < 1e-13 {
-                break;
-            }
+/// When nothing is `left` of what keeps the path, by the Illinois method.
+// apart: most steps cross nothing
+#[cold]
+#[inline(never)]
+fn crossing<const N: usize>(
+    algebra: impl Fn(&[f64; N], f64) -> Algebra<N> + Copy,
+    x: &[f64; N],
+    a: &Algebra<N>,
+    path: &Path,
+    (t, h): (f64, f64),
+    end: f64,
+) -> f64 {
+    let (mut low, mut high) = ((0.0, left(a, path)), (h, end));
+    // a bound alone: the tests take 8 turns at most, and as many halvings end at 1e-12 of the step
+    for _ in 0..40 {
+        let guess = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+        let inside = guess > low.0.min(high.0) && guess < low.0.max(high.0);
+        if !inside || (high.0 - low.0).abs() < 1e-15 * h {
+            break;
         }
-        high.0
+        let state = runge_kutta(algebra, x, a, t, guess);
+        let i = left(&algebra(&state, t + guess), path);
+        if i * high.1 < 0.0 {
+            low = high;
+        } else {
+            // the Illinois rule: plain regula falsi would keep this end for ever on a curve that bends one way
+            low.1 *= 0.5;
+        }
+        high = (guess, i);
+        // rounding of a current of amperes, 1e-16 of it, a thousand times
+        if i.abs() < 1e-13 {
+            break;
+        }
     }
+    high.0
+}
 
-    fn step<const N: usize>(
-        &self,
-        x: &[f64; N],
-        first: &Algebra<N>,
-        path: &Path,
-        load: &Load,
-        t: f64,
-        h: f64,
-    ) -> [f64; N] {
-        // the slopes at the start are known from the step before: three evaluations instead of four
-        let k1 = &first.slopes;
-        let k2 = self.algebra(&moved(x, k1, 0.5 * h), path, load, t + 0.5 * h).slopes;
-        let k3 = self.algebra(&moved(x, &k2, 0.5 * h), path, load, t + 0.5 * h).slopes;
-        let k4 = self.algebra(&moved(x, &k3, h), path, load, t + h).slopes;
-        let mut end = *x;
-        let sixth = h / 6.0;
-        for n in 0..N {
-            end[n] += sixth * (k1[n] + 2.0 * (k2[n] + k3[n]) + k4[n]);
-        }
-        end
+#[inline(always)]
+fn runge_kutta<const N: usize>(
+    algebra: impl Fn(&[f64; N], f64) -> Algebra<N> + Copy,
+    x: &[f64; N],
+    first: &Algebra<N>,
+    t: f64,
+    h: f64,
+) -> [f64; N] {
+    // the slopes at the start are known from the step before: three evaluations instead of four
+    let k1 = &first.slopes;
+    let k2 = algebra(&moved(x, k1, 0.5 * h), t + 0.5 * h).slopes;
+    let k3 = algebra(&moved(x, &k2, 0.5 * h), t + 0.5 * h).slopes;
+    let k4 = algebra(&moved(x, &k3, h), t + h).slopes;
+    let mut end = *x;
+    let sixth = h / 6.0;
+    for n in 0..N {
+        end[n] += sixth * (k1[n] + 2.0 * (k2[n] + k3[n]) + k4[n]);
     }
+    end
 }
 
 /// What keeps a path that ends by itself, and is 0 when it does: the current of a diode; of an open leg the voltage that the

@@ -5,6 +5,8 @@
 //!  [[spread]] ──┘
 //! ```
 
+use std::sync::Arc;
+
 use plant::{Load, Sample};
 use policy::Policy;
 
@@ -17,7 +19,7 @@ use crate::settings::Requirement;
 use crate::trainer::Trainer;
 use closed_loop::Agent;
 use closed_loop::environment::{Environment, Start, Varied};
-use closed_loop::scenario::{Finding, survey, survey_all};
+use closed_loop::scenario::{Finding, survey_all};
 
 /// A converter on which policies are judged.
 #[derive(Debug, Clone)]
@@ -78,42 +80,6 @@ impl<E: Environment> Trainer<E> {
         Ok(())
     }
 
-    /// The cost grows with load steps and instants: a policy that some of them rule out is not run through the rest, and
-    /// its cost is a lower bound.
-    pub(crate) fn judge(&self, network: &Network) -> Result<Score, Error> {
-        let selection = &self.settings.selection;
-        let task = &selection.task;
-        let controller = quick_controller(&self.contract, network)?;
-        let best = self.best.as_ref().map_or(f64::INFINITY, |best| best.score.cost);
-        let instants = task.all_instants();
-        let places = self.places();
-        let mut whole = Score { met: false, cost: 0.0 };
-        // one instant of each load step first: what fails there needs none of the others
-        for instants in [&instants[..1], &instants] {
-            whole = Score { met: true, cost: 0.0 };
-            for place in &places {
-                let scoring = Scoring::new(&task.load_steps, place.specification, selection.margin);
-                let mut findings = Vec::new();
-                let mut score = scoring.score(&[]);
-                for &load_step in &task.load_steps {
-                    let v_ref = self.settings.reward.v_ref;
-                    findings.push(survey(&place.converter, &controller, v_ref, task, load_step, instants)?);
-                    score = scoring.score(&findings);
-                    let cost = whole.cost + score.cost / places.len() as f64;
-                    if cost >= best {
-                        // cut short, so nothing can be said of the rest
-                        return Ok(Score { met: false, cost });
-                    }
-                }
-                whole = Score {
-                    met: whole.met && score.met,
-                    cost: whole.cost + score.cost / places.len() as f64,
-                };
-            }
-        }
-        Ok(whole)
-    }
-
     /// The evaluation of a policy, the plant as its file says first; the limits are as they are, without the margin of the
     /// selection, which only makes the choice stricter than the verdict.
     pub(crate) fn evaluate(&self, policy: &Policy) -> Result<Vec<Judged>, Error> {
@@ -155,7 +121,8 @@ pub fn quick_controller(
     network: &Network,
 ) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
     let mut agent = Agent::<f32>::new(&contract.policy)?;
-    let network = network.clone();
+    // shared: every run of a look goes on from a copy of its lead's controller
+    let network = Arc::new(network.clone());
     let mut scratch = [Vec::new(), Vec::new()];
     Ok(move |sample: &Sample| {
         if agent.sense(&sample.measured).is_err() {

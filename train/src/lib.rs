@@ -33,6 +33,7 @@ pub mod start;
 pub mod summary;
 pub mod tensorboard;
 pub mod trainer;
+mod trials;
 
 pub use closed_loop::scenario::Metrics;
 pub use closed_loop::{Converter, Environment};
@@ -40,7 +41,7 @@ pub use contract::{Contract, Files};
 pub use faults::Error;
 pub use judge::Judged;
 pub use outcome::{Outcome, tables};
-pub use seeds::{Course, SeedRun, Unwatched, Watch, train_all};
+pub use seeds::{Course, SeedRun, Unwatched, Watch, train_all, train_converter};
 pub use settings::Settings;
 pub use toml_input::{Fault, Faults, Place};
 pub use trainer::{Ended, Progress, Trainer};

@@ -229,23 +229,11 @@ impl Network {
     /// Q values of one observation in the order of `docs/reference/numeric-contract.md`, section 6 (from the bias, inputs in
     /// order, nothing contracted): the bits of the compiled policy. `scratch` grows once to the widest layer.
     pub fn q_values(&self, observation: &[f32], scratch: &mut [Vec<f32>; 2]) {
-        let [x, y] = scratch;
-        x.clear();
-        x.extend_from_slice(observation);
-        for layer in &self.layers {
-            y.clear();
-            y.extend_from_slice(&self.parameters[layer.bias.clone()]);
-            let rows = self.parameters[layer.weights.clone()].chunks_exact(layer.outputs);
-            // inputs outside, outputs inside: each sum keeps the contract's order, and the compiler may take several at
-            // once. Rust never contracts the product and the sum to a fused operation
-            for (row, &x) in rows.zip(x.iter()) {
-                for (sum, &w) in y.iter_mut().zip(row) {
-                    *sum += w * x;
-                }
-            }
-            interp::activate(layer.activation, y.iter_mut());
-            std::mem::swap(x, y);
-        }
+        wide::widest(Act {
+            network: self,
+            observation,
+            scratch,
+        });
     }
 
     /// Copies the parameters into the layers of a policy of the same shape (weights `[outputs][inputs]`).
@@ -262,6 +250,61 @@ impl Network {
         let weights = view(&self.parameters[layer.weights.clone()], layer.inputs, layer.outputs);
         weights.t().iter().copied().collect()
     }
+}
+
+/// [`Network::q_values`] at work.
+struct Act<'a> {
+    network: &'a Network,
+    observation: &'a [f32],
+    scratch: &'a mut [Vec<f32>; 2],
+}
+
+impl wide::Work for Act<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let [x, y] = self.scratch;
+        x.clear();
+        x.extend_from_slice(self.observation);
+        for layer in &self.network.layers {
+            let parameters = &self.network.parameters;
+            y.clear();
+            y.extend_from_slice(&parameters[layer.bias.clone()]);
+            let weights = &parameters[layer.weights.clone()];
+            let mut at = 0;
+            at = add_products::<64>(weights, x, y, at);
+            at = add_products::<16>(weights, x, y, at);
+            at = add_products::<8>(weights, x, y, at);
+            at = add_products::<4>(weights, x, y, at);
+            add_products::<1>(weights, x, y, at);
+            interp::activate(layer.activation, y.iter_mut());
+            std::mem::swap(x, y);
+        }
+    }
+}
+
+/// Adds weight times input to as many outputs from `at` on as there are whole blocks of `N`; returns where they end.
+// inputs inside, a block of outputs in registers: each sum keeps the contract's order, and the compiler takes several at
+// once. Rust never contracts the product and the sum to a fused operation
+#[inline(always)]
+fn add_products<const N: usize>(weights: &[f32], inputs: &[f32], outputs: &mut [f32], at: usize) -> usize {
+    let width = outputs.len();
+    let (blocks, _) = outputs[at..].as_chunks_mut::<N>();
+    let mut at = at;
+    for block in blocks {
+        let mut sums = *block;
+        for (row, &x) in weights.chunks_exact(width).zip(inputs) {
+            if let Some(row) = row[at..].first_chunk::<N>() {
+                for (sum, &w) in sums.iter_mut().zip(row) {
+                    *sum += w * x;
+                }
+            }
+        }
+        *block = sums;
+        at += N;
+    }
+    at
 }
 
 impl Activations {

@@ -9,10 +9,12 @@ use crate::checkpoint::{Reader, Writer, other};
 use crate::faults::Error;
 use crate::score::Score;
 use crate::trainer::{Best, Look, Sums, Trainer};
+use crate::trials::Told;
 use closed_loop::environment::Environment;
 
 impl<E: Environment> Trainer<E> {
-    /// The whole training: networks, optimiser, replay, random numbers, plant, filters, curve, best policy.
+    /// The whole training: networks, optimiser, replay, random numbers, plant, filters, curve, best policy, what the
+    /// trials told.
     ///
     /// # Errors
     /// If the plant's state cannot be written down.
@@ -61,6 +63,8 @@ impl<E: Environment> Trainer<E> {
             to.f64(best.score.cost);
             to.floats(&best.network.parameters);
         }
+        to.u64(self.told.0.len() as u64);
+        to.numbers(&self.told.0);
         Ok(to.finish())
     }
 
@@ -146,6 +150,12 @@ impl<E: Environment> Trainer<E> {
             from.floats_into(&mut network.parameters)?;
             self.best = Some(Best { step, score, network });
         }
+        let count = from.count()?;
+        // before so many are read: the trials are those of the training file
+        if count != self.trial_count() {
+            return Err(other());
+        }
+        self.told = Told((0..count).map(|_| from.f64()).collect::<Result<_, _>>()?);
         Ok(())
     }
 

@@ -32,6 +32,8 @@ pub struct Scoring<'a> {
     load_steps: &'a [[f64; 2]],
     specification: &'a [Requirement],
     margin: f64,
+    /// Those of the specification that speak of each load step.
+    concerned: Vec<Vec<&'a Requirement>>,
     /// Number of figures that are limited.
     count: f64,
 }
@@ -44,8 +46,14 @@ impl<'a> Scoring<'a> {
             load_steps,
             specification,
             margin,
+            concerned: Vec::new(),
             count: 0.0,
         };
+        let concerned = |index| {
+            let speaks = |requirement: &&Requirement| scoring.concerns(requirement, index);
+            specification.iter().filter(speaks).collect()
+        };
+        scoring.concerned = (0..load_steps.len()).map(concerned).collect();
         let figures = |index| scoring.limited(index, &Metrics::default(), &Metrics::default()).len();
         // of all load steps: over those seen so far the mean of the first few would be no lower bound
         scoring.count = (0..load_steps.len()).map(figures).sum::<usize>().max(1) as f64;
@@ -80,10 +88,7 @@ impl<'a> Scoring<'a> {
             // conventions: twice the paper's 5 V and 5 ms, and what its bench had left without a mapping
             return vec![(worst.deviation, 10.0), (worst.settling, 1e-2), (worst.tail_max, 1.0)];
         }
-        let concerned = self
-            .specification
-            .iter()
-            .filter(|requirement| self.concerns(requirement, index));
+        let concerned = self.concerned.get(index).into_iter().flatten();
         let pairs = concerned.flat_map(|requirement| match requirement.instants {
             Instants::Sample => figures(at_sample, requirement),
             Instants::Worst => figures(worst, requirement),

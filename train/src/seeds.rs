@@ -16,6 +16,7 @@ use crate::outcome::Outcome;
 use crate::settings::Settings;
 use crate::summary::Worst;
 use crate::trainer::{Ended, Progress, Trainer};
+use closed_loop::Converter;
 use closed_loop::environment::Environment;
 use closed_loop::scenario::settled_band;
 use closed_loop::{digits, time_digits};
@@ -110,6 +111,22 @@ pub fn train_all<E: Environment + Sync>(
     let missing = || Err(Message::new("a training thread ended without a result").into());
     let result = |slot: Mutex<Option<_>>| slot.into_inner().ok().flatten().unwrap_or_else(missing);
     results.into_iter().map(result).collect()
+}
+
+/// [`train_all`] on a converter, compiled in this crate: its generics would else be compiled in the caller's, which may be
+/// optimised less.
+///
+/// # Errors
+/// As [`train_all`].
+pub fn train_converter(
+    settings: &Settings,
+    contract: &Contract,
+    converter: &Converter,
+    course: &Course,
+    stop: &AtomicBool,
+    watch: &dyn Watch,
+) -> Result<Vec<SeedRun>, Error> {
+    train_all(settings, contract, converter, course, stop, watch)
 }
 
 fn one<E: Environment>(

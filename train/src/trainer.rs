@@ -25,6 +25,7 @@ pub(crate) use crate::progress::Sums;
 pub use crate::progress::{Best, Ended, Look, Progress};
 use crate::replay::ReplayBuffer;
 use crate::settings::Settings;
+use crate::trials::Told;
 use closed_loop::Agent;
 use closed_loop::environment::{Environment, LoadPath, Start};
 
@@ -57,6 +58,7 @@ pub struct Trainer<E> {
     pub(crate) curve: Vec<Look>,
     pub(crate) best: Option<Best>,
     pub(crate) met: bool,
+    pub(crate) told: Told,
     before: Vec<f32>,
     scratch: [Vec<f32>; 2],
     /// When and at which control period this program began with it; not part of a checkpoint.
@@ -93,10 +95,12 @@ impl<E: Environment> Trainer<E> {
             curve: Vec::new(),
             best: None,
             met: false,
+            told: Told::new(0),
             before: Vec::new(),
             scratch: [Vec::new(), Vec::new()],
             started: None,
         };
+        trainer.told = Told::new(trainer.trial_count());
         trainer.try_out_spread()?;
         trainer.begin_episode()?;
         Ok(trainer)
@@ -264,8 +268,9 @@ impl<E: Environment> Trainer<E> {
         let mut cost = f64::INFINITY;
         let soft = matches!(self.settings.learning.learner.target_update, TargetUpdate::Soft { .. });
         let networks = [Some(&self.learner.online), soft.then_some(&self.learner.target_network)];
+        let mut told = self.told.clone();
         for network in networks.into_iter().flatten() {
-            let score = self.judge(network)?;
+            let score = self.judge(network, &mut told)?;
             cost = cost.min(score.cost);
             if self.best.as_ref().is_none_or(|best| score.cost < best.score.cost) {
                 self.best = Some(Best {
@@ -276,6 +281,7 @@ impl<E: Environment> Trainer<E> {
                 self.met = score.met && self.settings.early_stop;
             }
         }
+        self.told = told;
         let per = |sum: f64, count: u64| sum / count.max(1) as f64;
         let sums = std::mem::take(&mut self.sums);
         self.curve.push(Look {

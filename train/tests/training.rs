@@ -8,8 +8,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use closed_loop::scenario::load_step;
+use closed_loop::scenario::{load_step, survey_all};
 use common::{Alarm, StandIn, tiny};
+use train::score::Scoring;
 use train::trainer::{controller, quick_controller};
 use train::{Course, Ended, Trainer, Unwatched, seeds, train_all};
 
@@ -85,6 +86,22 @@ fn the_controller_of_the_looks_commands_what_the_interpreter_commands() {
         };
         assert_eq!(run(true), run(false));
     }
+}
+
+/// Candidates that are ruled out early must not be better than the one that is kept, whose cost is that of everything.
+#[test]
+fn the_cost_of_the_best_is_that_of_every_load_step_at_every_instant() {
+    let mut trainer = trainer(3);
+    trainer.run_until(1500, &NEVER, |_| {}).unwrap();
+    let (settings, contract) = tiny();
+    let (selection, best) = (&settings.selection, trainer.best().unwrap());
+    let controller = quick_controller(&contract, &best.network).unwrap();
+    let (task, environment) = (&selection.task, StandIn::new(1.5e-3, 1));
+    let v_ref = settings.reward.v_ref;
+    let findings = survey_all(&environment, &controller, v_ref, task, &task.all_instants()).unwrap();
+    let scoring = Scoring::new(&task.load_steps, &settings.specification, selection.margin);
+    assert_eq!(scoring.score(&findings), best.score);
+    assert!(trainer.curve().iter().all(|look| look.cost >= best.score.cost));
 }
 
 #[test]

@@ -75,7 +75,7 @@ impl Full {
 
     /// What the averaged model adds to the resistance: the output stands against the inductor while it receives the
     /// current, and then lies above its mean by the ESR's share of that current.
-    fn apart(&self, path: &Path, load: &Load) -> f64 {
+    pub(super) fn apart(&self, path: &Path, load: &Load) -> f64 {
         // 0 in every state of the leg, where `give` is 0 or 1
         if path.give == 0.0 || path.give == 1.0 {
             return 0.0;
@@ -104,16 +104,15 @@ impl Full {
             slope += divided;
             right += divided * (x[V_LOAD] + cable.resistance * x[I_CABLE]) - c.esr * x[I_CABLE];
             // the cable's current is a state: constant power acts behind it and needs no equation here
-            return (right / slope, x[I_CABLE]);
+            let v = if slope == 1.0 { right } else { right / slope };
+            return (v, x[I_CABLE]);
         }
         let has_lag = N != FEW && self.has_lag;
         let fixed = load.current + if has_lag { x[I_CPL] } else { 0.0 };
         slope += c.esr * load.conductance;
         right -= c.esr * fixed;
-        // a division that constant power with an ESR does not need
-        let without = || if slope == 1.0 { right } else { right / slope };
         if has_lag || load.power == 0.0 {
-            let v = without();
+            let v = if slope == 1.0 { right } else { right / slope };
             return (v, load.conductance * v + fixed);
         }
         // above the fold it is the larger solution of slope v^2 - right v + esr P = 0
@@ -123,13 +122,20 @@ impl Full {
         } else {
             0.0
         };
-        // without ESR the voltage is that of the capacitor, whatever the load draws
-        let is_above = above >= self.p.load.v_fold;
-        let mut v = match c.esr > 0.0 && is_above {
-            true => above,
-            false => without(),
-        };
-        if c.esr > 0.0 && !is_above {
+        if c.esr > 0.0 && above >= self.p.load.v_fold {
+            let cpl = self.constant_power(load, above);
+            return (above, load.conductance * above + fixed + cpl);
+        }
+        self.output_near_fold(load, slope, right, fixed)
+    }
+
+    /// Output voltage and current from `slope v + esr P / v = right` below the fold, or at any voltage without an ESR.
+    #[inline(never)]
+    pub(super) fn output_near_fold(&self, load: &Load, slope: f64, right: f64, fixed: f64) -> (f64, f64) {
+        let esr = self.p.capacitor.esr;
+        // without ESR the voltage is that of the capacitor, whatever the load draws; a division that it does not need
+        let mut v = if slope == 1.0 { right } else { right / slope };
+        if esr > 0.0 {
             // Newton's error squares: behind the fourth turn less than 2e-16 of v is left in the tests
             for _ in 0..4 {
                 let cpl = self.constant_power(load, v);
@@ -140,7 +146,7 @@ impl Full {
                     cpl / v.max(1e-300)
                 };
                 // constant power is a negative resistance: near the fold it may turn Newton's step round
-                v -= (slope * v + c.esr * cpl - right) / (slope + c.esr * turn).max(0.1 * slope);
+                v -= (slope * v + esr * cpl - right) / (slope + esr * turn).max(0.1 * slope);
             }
         }
         (v, load.conductance * v + fixed + self.constant_power(load, v))

@@ -6,7 +6,16 @@ use crate::workspace::{Crate, Dependency, Kind};
 
 /// Lowest layer first; a crate depends on strictly lower layers only.
 const LAYERS: &[&[&str]] = &[
-    &["random", "toml-input", "mat", "mdf", "targets", "templates", "report"],
+    &[
+        "random",
+        "wide",
+        "toml-input",
+        "mat",
+        "mdf",
+        "targets",
+        "templates",
+        "report",
+    ],
     &["policy", "plant", "measured", "campaign"],
     &["certify"],
     &["import", "interp", "codegen", "drm", "equivalence"],

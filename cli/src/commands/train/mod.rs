@@ -8,7 +8,7 @@ use serde::Serialize;
 use toml_input::{FileName, Message};
 use train::summary::Summary;
 use train::{
-    Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, page, seeds, tables, train_all,
+    Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, page, seeds, tables, train_converter,
 };
 
 use super::foreign::opener;
@@ -70,7 +70,7 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     let stop = interruption::stop_on_signal();
     let start = Instant::now();
     let watcher = Watcher::new(&settings, &kept, events.as_ref(), &stop);
-    let result = train_all(&settings, &contract, &converter, &course, &stop, &watcher);
+    let result = train_converter(&settings, &contract, &converter, &course, &stop, &watcher);
     watcher.finish()?;
     let runs = result?;
     if runs.iter().any(|run| run.ended == Ended::Interrupted) {

@@ -1,0 +1,59 @@
+//! How much a diagnosis may compute. Counted and not timed, so that a slow machine finds what a fast one finds; looked at between pieces of
+//! work only, so that threads do not change what is found.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use crate::drive::Model;
+use crate::record::Record;
+
+/// Rows of a plain converter that a diagnosis simulates before it begins nothing more.
+const ROWS: u64 = 40_000_000;
+/// What a row costs with a load cable, in rows without.
+const CABLE: u64 = 10;
+/// What a settled point costs: it is sought over many periods.
+const SETTLED: u64 = 30;
+
+/// What all searches of a diagnosis have computed together.
+#[derive(Debug, Clone, Default)]
+pub struct Work(Arc<Counts>);
+
+#[derive(Debug, Default)]
+struct Counts {
+    rows: AtomicU64,
+    was_cut: AtomicBool,
+}
+
+impl Work {
+    /// A record is simulated.
+    pub(crate) fn add(&self, model: &Model, record: &Record) {
+        let of_plant = match model.plant.cable.inductance > 0.0 {
+            true => CABLE,
+            false => 1,
+        };
+        let of_record = if record.settled { SETTLED } else { 1 };
+        let rows = record.rows() as u64 * of_plant * of_record;
+        self.0.rows.fetch_add(rows, Ordering::Relaxed);
+    }
+
+    /// Whether another piece of work may begin; one that may not is remembered.
+    pub(crate) fn goes_on(&self) -> bool {
+        let goes_on = self.0.rows.load(Ordering::Relaxed) < ROWS;
+        if !goes_on {
+            self.0.was_cut.store(true, Ordering::Relaxed);
+        }
+        goes_on
+    }
+
+    /// What is said where something was not begun.
+    #[must_use]
+    pub(crate) fn said(&self) -> Option<String> {
+        self.0.was_cut.load(Ordering::Relaxed).then(|| {
+            format!(
+                "the search ended at its budget of {} million simulated rows, and what it had found by then is shown: larger sets of causes, and \
+                 records without one channel, were not all tried",
+                ROWS / 1_000_000
+            )
+        })
+    }
+}

@@ -103,7 +103,8 @@ fn is_near_the_limit_with_smaller_parts(example: &str, v_ref: f64, loads: [f64; 
     desk.succeed(&format!(
         "new --plant plant.toml --v-ref {v_ref} --loads {low},{high} --out mine"
     ));
-    desk.succeed("train mine/train.toml --out mine/trained --seeds 0");
+    // of three seeds, as the file has it: one alone may miss the settling by an unlucky instant
+    desk.succeed("train mine/train.toml --out mine/trained");
     for key in ["inductance", "capacitance"] {
         let key = format!("\"converter.{key}\"");
         desk.edit("mine/scenario.toml", &format!("# {key}"), &key);

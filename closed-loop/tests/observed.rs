@@ -182,3 +182,42 @@ fn the_map_around_rest_has_the_slopes_of_the_law_behind_the_predicted_estimates(
         assert!(error.abs() < 0.02 && current.abs() < 0.05, "{error} V, {current} A");
     }
 }
+
+/// The bench of `examples/simulate/measured.toml`, whose sensors are noisy, on converters that the design does not know.
+#[test]
+fn a_network_that_blends_two_laws_settles_as_behind_the_fast_observer_and_rests_as_behind_the_slow_one() {
+    let policy = policy::load(&examples().join("simulate/blend/policy.toml")).unwrap();
+    let scenario = fs::read_to_string(examples().join("simulate/measured.toml")).unwrap();
+    let start = scenario.find("load_steps").unwrap();
+    let set = scenario.find("[set]").unwrap();
+    let task = "load_steps = [[200, 1000], [1000, 200]]\nsampling_instants = 1\ninstants = 6\nlead = 200\nafter = 300\ntail = 100\nlimit = false\n";
+    let two = "baselines = [\"feed-forward\"]\nobserver = [\"model\", \"fast\"]\n";
+    let bench = format!(
+        "{}{task}{two}{}",
+        scenario[..start].replace("../plants", "plants"),
+        &scenario[set..]
+    );
+    let (mut settling, mut tail) = ([0.0_f64; 4], [0.0_f64; 4]);
+    for (l, c, v_in) in [(0.8, 0.8, 191.0), (1.2, 1.2, 209.0), (0.8, 1.2, 209.0)] {
+        let numbers = format!(
+            "\"converter.inductance\" = {}\n\"converter.capacitance\" = {}\n\"converter.v_in\" = {v_in:?}\n\"switch.v_f\" = 0.5\n",
+            l * 2e-3,
+            c * 1.5e-3
+        );
+        let found = run(&format!("{bench}{numbers}"), &policy);
+        assert_eq!(
+            names(&found),
+            ["policy", "law alone", "feed-forward model", "feed-forward fast"]
+        );
+        for step in &found.steps {
+            for (n, (_, course)) in step.courses.iter().enumerate() {
+                settling[n] = settling[n].max(course.finding.worst.settling);
+                tail[n] = tail[n].max(course.finding.worst.tail_max);
+            }
+        }
+    }
+    let ([policy, law, slow, fast], said) = (settling, format!("{settling:?} {tail:?}"));
+    assert!(policy < 0.85 * slow && policy < 1.1 * fast && slow < law, "{said}");
+    let [policy, _, slow, fast] = tail;
+    assert!(policy < 1.2 * slow && policy < 0.5 * fast, "{said}");
+}

@@ -168,11 +168,15 @@ impl Policy {
         sources.any(|source| source.reads(input)) || self.observers.iter().any(observed)
     }
 
-    /// The law of a residual head without what the network adds to it, as a policy of its own; `None` of another head, and of a
-    /// base that reads nothing measured, such as `previous_duty`: on its own that is a constant and no law.
+    /// The law of a residual head or a gain schedule without what the network adds to it, as a policy of its own; `None` of another
+    /// head, and of a base that reads nothing measured, such as `previous_duty`: on its own that is a constant and no law.
     #[must_use]
     pub fn law_alone(&self) -> Option<Self> {
-        let base = &self.head.residual()?.base.tree;
+        let base = match &self.head {
+            Head::Residual(head) => &head.base.tree,
+            Head::Schedule(head) => &head.base.tree,
+            Head::Choice(_) | Head::Continuous(_) | Head::Several(_) => return None,
+        };
         let signals = (0..self.signals.len()).map(Input::Signal);
         let estimates = (0..self.observers.len())
             .flat_map(|observer| Estimate::ALL.map(|estimate| Input::Estimate(observer, estimate)));
@@ -182,6 +186,10 @@ impl Policy {
         }
         let mut law = self.clone();
         law.actions_mut().iter_mut().for_each(|action| action.duty = 0.0);
+        if let Head::Schedule(head) = &mut law.head {
+            let none = Some(Interval { low: 0.0, high: 0.0 });
+            head.gains.iter_mut().for_each(|gain| gain.limits = none);
+        }
         Some(law)
     }
 

@@ -153,6 +153,19 @@ impl Contract {
         policy
     }
 
+    /// A network that adds nothing to the law of a residual policy, whatever it sees; `None` without a law that stands alone
+    /// ([`Policy::law_alone`]) or an offset of 0.
+    #[must_use]
+    pub fn adds_nothing(&self) -> Option<Network> {
+        self.policy.law_alone()?;
+        let nothing = self.policy.actions().iter().position(|action| action.duty == 0.0)?;
+        let mut network = self.network();
+        let bias = network.layers().last()?.bias.clone();
+        // far from a tie in every number format
+        *network.parameters[bias].get_mut(nothing)? = 1.0;
+        Some(network)
+    }
+
     /// The complete policy folder of a trained network, checked as `policy::load` checks it, golden vectors included.
     ///
     /// # Errors

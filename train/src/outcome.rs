@@ -144,10 +144,16 @@ impl<E: Environment> Trainer<E> {
             format!("seed        {}", self.seed),
             format!("network     {actions}"),
             format!("training    {steps} control periods: {ended}"),
-            format!(
-                "kept        the policy after {} control periods, cost {:.4}",
-                best.step, best.score.cost
-            ),
+            match best.step {
+                0 => format!(
+                    "kept        the law alone, cost {:.4}: no network did better",
+                    best.score.cost
+                ),
+                step => format!(
+                    "kept        the policy after {step} control periods, cost {:.4}",
+                    best.score.cost
+                ),
+            },
             format!("train.toml  SHA-256 {}", self.settings.digest),
         ];
         out.push_str(&lines.join("\n"));
@@ -226,6 +232,10 @@ pub fn tables(judged: &[Judged], law: &[Judged]) -> String {
         let verdict = match (policy.met, law.met) {
             (true, false) => "The law alone does not meet the specification.".to_owned(),
             (false, true) => "The law alone meets the specification: the network makes it worse.".to_owned(),
+            _ if law.cost == policy.cost => format!(
+                "The policy is the law alone (cost {:.3}): no network did better on the load steps of [selection].",
+                law.cost
+            ),
             _ if law.cost < policy.cost => format!(
                 "The law alone is the better one (cost {:.3}, the policy {:.3}): the network adds nothing.",
                 law.cost, policy.cost

@@ -102,8 +102,22 @@ impl<E: Environment> Trainer<E> {
         };
         trainer.told = Told::new(trainer.trial_count());
         trainer.try_out_spread()?;
+        trainer.begin_with_the_law()?;
         trainer.begin_episode()?;
         Ok(trainer)
+    }
+
+    /// A law that networks add to is the first candidate: what does no better than it is not kept, and does not end the training.
+    fn begin_with_the_law(&mut self) -> Result<(), Error> {
+        let Some(network) = self.contract.adds_nothing() else {
+            return Ok(());
+        };
+        self.best = Some(Best {
+            step: 0,
+            score: self.judge(&network)?,
+            network,
+        });
+        Ok(())
     }
 
     /// Control periods so far.
@@ -130,7 +144,8 @@ impl<E: Environment> Trainer<E> {
         &self.learner.online
     }
 
-    /// The policy that did best so far; nothing before the first look.
+    /// The policy that did best so far; nothing before the first look, unless there is a law to add to: then a network that adds
+    /// nothing to it, after 0 control periods.
     #[must_use]
     pub fn best(&self) -> Option<&Best> {
         self.best.as_ref()

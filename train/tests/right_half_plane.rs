@@ -12,7 +12,7 @@ use closed_loop::scenario::{Finding, Task, survey_all};
 use closed_loop::{Agent, Converter};
 use plant::{Parameters, Sample};
 use train::start::{Start, Wanted};
-use train::{Contract, Settings, Trainer};
+use train::{Contract, Ended, Settings, Trainer};
 
 struct Desk {
     plant: Parameters,
@@ -143,4 +143,26 @@ fn a_boost_that_was_trained_for_a_short_time_regulates_better_than_its_duty_at_r
         );
         assert!(trained.worst.tail_max < 0.5, "{trained:?}");
     }
+}
+
+/// A buck-boost whose law hardly any network betters: two looks at hardly trained ones.
+#[test]
+fn a_training_that_finds_nothing_better_than_the_law_keeps_the_law() {
+    let mut desk = desk("buck-boost-12-24", 24.0, "");
+    (desk.settings.steps, desk.settings.selection.every) = (60, 30);
+    let never = AtomicBool::new(false);
+    let mut trainer = Trainer::new(&desk.settings, &desk.contract, &desk.converter, 0).unwrap();
+    let law = trainer.best().expect("the law is there from the start").score;
+    assert_eq!(trainer.run(&never, |_| ()).unwrap(), Ended::Budget);
+    assert!(trainer.curve().iter().all(|look| look.cost >= law.cost));
+    let outcome = trainer.finish(Ended::Budget).unwrap();
+    assert_eq!((outcome.best_step, outcome.selected), (0, law));
+    for (policy, law) in outcome.judged.iter().zip(&outcome.law) {
+        assert_eq!(policy.findings, law.findings, "to the bit");
+    }
+    let report = String::from_utf8(outcome.files["report.txt"].clone()).unwrap();
+    assert!(
+        report.contains("kept        the law alone") && report.contains("The policy is the law alone"),
+        "{report}"
+    );
 }

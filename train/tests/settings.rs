@@ -125,6 +125,37 @@ fn curriculum_stages_follow_one_another() {
     assert_eq!(settings.stage(20).1, 1.0);
 }
 
+#[test]
+fn another_converter_has_limits_of_its_own_for_each_load_step() {
+    let spread = "[[spread]]\nfactor = { \"converter.v_in\" = 0.9 }\ntail = 0.5\n";
+    let of_steps = "[[spread.spec]]\nload_step = [200, 500]\ndeviation = 1\n[[spread.spec]]\nload_step = [500, 200]\nsettling = 2\n";
+    let settings = parse(&format!("{LEAST}{spread}{of_steps}")).unwrap();
+    let limits: Vec<_> = settings.spread[0]
+        .limits
+        .iter()
+        .map(|own| {
+            (
+                own.load_step,
+                own.limits.deviation,
+                own.limits.settling,
+                own.limits.tail,
+            )
+        })
+        .collect();
+    assert_eq!(
+        limits,
+        [
+            (Some([200.0, 500.0]), Some(1.0), None, None),
+            (Some([500.0, 200.0]), None, Some(2.0), None),
+            (None, None, None, Some(0.5)),
+        ]
+    );
+    assert!(
+        settings.specification.is_empty(),
+        "those of the spread are not the file's"
+    );
+}
+
 /// Text behind the least file, its line there, and what the message must say.
 const FAULTS: &[(&str, usize, &[&str])] = &[
     ("stepps = 3", 4, &["unknown key `stepps`", "did you mean `steps`?"]),
@@ -254,6 +285,11 @@ const FAULTS: &[(&str, usize, &[&str])] = &[
         "[[spread]]\nfactor = { \"converter.v_in\" = 0 }",
         5,
         &["greater than 0"],
+    ),
+    (
+        "[[spread]]\nset = { \"converter.v_in\" = 90 }\n[[spread.spec]]\nload_step = [200, 500]",
+        6,
+        &["a [[spec]] without a limit"],
     ),
     (
         "[[spec]]\ninstants = \"all\"\ntail = 1",

@@ -349,7 +349,8 @@ fn task(table: &mut Table<'_>, faults: &mut Sink) -> Option<Task> {
     given.then_some(task)
 }
 
-fn requirement(table: &mut Table<'_>, faults: &mut Sink) -> Option<Requirement> {
+/// A `[[spec]]`.
+pub(super) fn requirement(table: &mut Table<'_>, faults: &mut Sink) -> Option<Requirement> {
     let load_step = table
         .optional("load_step")
         .and_then(|v| v.pair(LoadKind::Power.range(), faults));

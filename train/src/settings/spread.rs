@@ -3,7 +3,7 @@
 use closed_loop::read;
 use toml_input::{Message, Sink, Table, Value};
 
-use super::read::limits;
+use super::read::{limits, requirement};
 use super::{Instants, Limits, Requirement};
 
 /// A converter beside that of the plant's file. Nothing is trained on it: a policy that is kept has to hold on it, too.
@@ -13,7 +13,7 @@ pub struct Spread {
     pub factor: Vec<(String, f64)>,
     /// Numbers of the plant, by key.
     pub set: Vec<(String, f64)>,
-    /// What a good policy does there: one requirement, or none, where the `[[spec]]` of the file hold.
+    /// What a good policy does there; none, where the `[[spec]]` of the file hold.
     pub limits: Vec<Requirement>,
 }
 
@@ -61,17 +61,15 @@ pub(super) fn read(table: &mut Table<'_>, faults: &mut Sink) -> Option<Spread> {
         let hint = "factor = { \"converter.inductance\" = 0.85, \"converter.capacitance\" = 0.85 }";
         faults.push(table.fault(message.hint(hint)));
     }
-    let requirement = Requirement {
+    let of_all_steps = Requirement {
         load_step: None,
         instants: Instants::Worst,
         limits: limits(table, faults),
     };
-    let is_given = requirement.limits != Limits::default();
-    Some(Spread {
-        factor,
-        set,
-        limits: is_given.then_some(requirement).into_iter().collect(),
-    })
+    let is_given = of_all_steps.limits != Limits::default();
+    let mut limits = table.sections("spec", faults, requirement);
+    limits.extend(is_given.then_some(of_all_steps));
+    Some(Spread { factor, set, limits })
 }
 
 /// Factors on numbers of a plant.

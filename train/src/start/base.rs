@@ -39,19 +39,19 @@ impl Base {
         self.nominal().loop_periods().map_or(0.0, |periods| 4.0 * periods)
     }
 
-    /// What the settling time is granted beside the limit's.
+    /// The same, behind a number of periods that is granted as well.
     pub fn patience_in_words(&self) -> &'static str {
         match self.nominal().loop_periods() {
-            None => "ten periods",
-            Some(_) => "ten periods, and four time constants of its loop",
+            None => "",
+            Some(_) => " and four time constants of its loop",
         }
     }
 
-    /// Why settling takes longer with other parts.
+    /// Why settling takes longer with other parts, behind a sentence.
     pub fn why_longer(&self) -> &'static str {
         match self {
-            Self::Observed(_) => "the observer has to find the other parts first",
-            Self::Measured { .. } => "the law is not made for these parts",
+            Self::Observed(_) => "; the observer has to find the other parts first",
+            Self::Measured { .. } => "; the law is not made for these parts",
         }
     }
 

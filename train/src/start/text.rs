@@ -5,7 +5,7 @@ use closed_loop::design::rounded;
 use closed_loop::limit::Limit;
 
 use super::base::Base;
-use super::{Channel, Start, largest_of};
+use super::{Channel, Start};
 
 /// Name of the training file.
 pub const TRAINING: &str = "train.toml";
@@ -141,6 +141,7 @@ impl Start {
              \n\
              [selection]                    # on these load steps the best policy is kept\n\
              every = 120\n\
+             margin = 0.95                  # other load steps and more instants will be a little worse\n\
              load_steps = [[{inner_low:?}, {inner_high:?}], [{inner_high:?}, {inner_low:?}]]\n\
              sampling_instants = 2\n\
              instants = 12\n\
@@ -152,10 +153,7 @@ impl Start {
              load_steps = [[{low:?}, {high:?}], [{high:?}, {low:?}]]\n\
              {}\
              \n\
-             [[spec]]\n\
-             deviation = {:?}             # V: 1.1 of what no controller can beat\n\
-             settling = {:?}              # s: twice of it, and {}\n\
-             tail = {:?}                  # V\n\
+             {}\
              {}",
             self.set(),
             self.wanted.v_ref,
@@ -163,10 +161,7 @@ impl Start {
             rounded(1.0 / volts, 2),
             self.after().unwrap_or(USUAL_AFTER),
             self.after_line(),
-            self.most_deviation(&self.limits),
-            self.most_settling(&self.limits, 10.0),
-            self.base.patience_in_words(),
-            self.most_tail(),
+            self.specification("[[spec]]", &self.limits, 10, ""),
             self.elsewhere(),
         )
     }
@@ -177,16 +172,31 @@ impl Start {
             format!(
                 "\n[[spread]]                     # it has to hold here as well; the limit is another one\n\
                  factor = {{ \"converter.inductance\" = {factor:?}, \"converter.capacitance\" = {factor:?} }}\n\
-                 deviation = {:?}\n\
-                 settling = {:?}              # {}\n\
-                 tail = {:?}\n",
-                self.most_deviation(limits),
-                self.most_settling(limits, 60.0),
-                self.base.why_longer(),
-                self.most_tail(),
+                 \n\
+                 {}",
+                self.specification("[[spread.spec]]", limits, 60, self.base.why_longer()),
             )
         };
         self.spread.iter().map(table).collect()
+    }
+
+    /// What a good policy does on each load step: an allowance that both share would let it be spoilt on the easier one.
+    fn specification(&self, title: &str, limits: &[(LoadStep, Limit); 2], periods: u32, why: &str) -> String {
+        let table = |(step, limit): &(LoadStep, Limit)| {
+            let [from, to] = step.values;
+            format!(
+                "{title}\n\
+                 load_step = [{from:?}, {to:?}]\n\
+                 deviation = {:?}             # V: 1.1 of what no controller can beat\n\
+                 settling = {:?}              # s: twice of it, and {periods} periods{}{why}\n\
+                 tail = {:?}                  # V\n",
+                rounded(1.1 * limit.worst.deviation, 3),
+                self.most_settling(limit, periods),
+                self.base.patience_in_words(),
+                self.most_tail(),
+            )
+        };
+        limits.each_ref().map(table).join("\n")
     }
 
     /// Control periods behind a load step, where the usual ones are not enough for the law to come to rest before the tail.
@@ -200,18 +210,10 @@ impl Start {
         self.after().map_or_else(String::new, line)
     }
 
-    /// V; a tenth more than what no controller can beat.
-    fn most_deviation(&self, limits: &[(LoadStep, Limit); 2]) -> f64 {
-        rounded(1.1 * largest_of(limits, |limit| limit.worst.deviation), 3)
-    }
-
     /// s; twice what no controller can beat, and some periods.
-    fn most_settling(&self, limits: &[(LoadStep, Limit); 2], periods: f64) -> f64 {
-        rounded(
-            2.0 * largest_of(limits, |limit| limit.worst.settling)
-                + (periods + self.base.patience()) * self.base.nominal().period,
-            3,
-        )
+    fn most_settling(&self, limit: &Limit, periods: u32) -> f64 {
+        let granted = (f64::from(periods) + self.base.patience()) * self.base.nominal().period;
+        rounded(2.0 * limit.worst.settling + granted, 3)
     }
 
     /// V; an estimate is hardly finer than its sensor.
@@ -231,11 +233,13 @@ impl Start {
              baselines = [{}]\n\
              {}\
              {}\
+             {}\
              # on a converter whose parts are 15 % smaller than their print says:\n\
              # \"converter.inductance\" = {:?}\n\
              # \"converter.capacitance\" = {:?}\n",
             self.base.beside_it(),
             self.base.baselines(),
+            self.limit_line(),
             self.after_line(),
             match self.set() {
                 none if none.is_empty() => "\n[set]\n".to_owned(),
@@ -244,6 +248,17 @@ impl Start {
             off(self.base.nominal().inductance),
             off(self.base.nominal().capacitance),
         )
+    }
+
+    /// A limit of all duties alone is one of another controller, where those of the contract end below 1.
+    fn limit_line(&self) -> String {
+        let [low, high] = self.duties;
+        match high < 1.0 {
+            true => format!(
+                "limit = [[{low:?}, {high:?}], [0.0, 1.0]]    # duties that it may use: those of the contract, and all\n"
+            ),
+            false => String::new(),
+        }
     }
 
     fn converter(&self) -> String {

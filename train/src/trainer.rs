@@ -112,9 +112,12 @@ impl<E: Environment> Trainer<E> {
         let Some(network) = self.contract.adds_nothing() else {
             return Ok(());
         };
+        let mut told = self.told.clone();
+        let score = self.judge(&network, &mut told)?;
+        self.told = told;
         self.best = Some(Best {
             step: 0,
-            score: self.judge(&network)?,
+            score,
             network,
         });
         Ok(())

@@ -138,9 +138,10 @@ impl<'a, T: Real> Course<'a, T> {
         for damage in damages(self.policy, &fresh) {
             self.play(Event::Init)?;
             self.put(|state| damage.apply(state));
-            match damage.gives_no_number(&fresh, &usual) {
-                true => self.play_without_numbers(&usual)?,
-                false => self.play(Event::Step(usual.clone()))?,
+            let samples = damage.samples(self.policy, &usual);
+            match damage.gives_no_number(&fresh, &samples) {
+                true => self.play_without_numbers(&samples)?,
+                false => self.play(Event::Step(samples))?,
             }
         }
         Ok(())

@@ -44,6 +44,7 @@ const RULES: &[Rule] = &[
         at_the_start,
         "at equality the difference is the 0 that stands on the other side",
     ),
+    (same_at_equality, "at equality both sides are the same number"),
     (
         behind_the_tables,
         "the position ends at the count of all tables, before this length",
@@ -449,4 +450,20 @@ fn limit_unreached(edited: &Edited) -> bool {
         && limits
             .into_iter()
             .all(|limit| limit.is_some_and(|limit| reach.is_some_and(|reach| 1.01 * reach < limit.into())))
+}
+
+/// A choice of the smaller or greater of two, and limits that put the limit itself in the place of an equal number.
+fn same_at_equality(edited: &Edited) -> bool {
+    if !edited.is("<", "<=") && !edited.is(">", ">=") {
+        return false;
+    }
+    let line = edited.line();
+    let of_two = ["(count < rest) ? count : rest", "(inside < length) ? inside : length"];
+    // zeros are equal and have two signs: no clamp may end at one
+    let clamps = || edited.lines.iter().filter(|line| line.contains("_clamp(v"));
+    let ends_at_zero = |line: &&&str| arguments(line, "_clamp").iter().any(|end| number(end) == Some(0.0));
+    let clamp = edited.within("clamp") && !clamps().any(|line| ends_at_zero(&line));
+    // the cap that is reached, which no status tells of
+    let cap = edited.within("advance") && line.starts_with("const uint32_t f") && line.contains("_flag(v");
+    of_two.iter().any(|text| line.contains(text)) || clamp || cap
 }

@@ -33,6 +33,10 @@ pub struct Damage<T> {
     missing: Option<usize>,
 }
 
+/// Of a state with more numbers than this, such as one with long averages, not every one is put elsewhere alone.
+// a convention, as is everything that bounds a kit's memory: a number takes some 400 bytes
+const MOST_ALONE: usize = 64;
+
 /// Farther than any clip end, and yet no sum that a network makes of it leaves binary32.
 const FAR: f64 = 1e6;
 
@@ -170,7 +174,16 @@ fn alone<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>> {
         });
         near.into_iter().map(move |x| Damage::primed(vec![(at, x)])).chain(far)
     };
-    fresh.sound_ends().into_iter().enumerate().flat_map(one).collect()
+    let ends = fresh.sound_ends();
+    // the memory of filters is what may be long, and it is neither first nor last
+    let memory = fresh.state().memory.len();
+    let stride = ends.len().div_ceil(MOST_ALONE);
+    let is_taken = |at: usize| match at.checked_sub(policy.signals.len()) {
+        Some(word) if word < memory => word % stride == 0 || word + 1 == memory,
+        _ => true,
+    };
+    let ends = ends.into_iter().enumerate();
+    ends.filter(|(at, _)| is_taken(*at)).flat_map(one).collect()
 }
 
 /// Where the parts of an output stand among the numbers of the state.

@@ -3,9 +3,14 @@
 //! A rule says of an edit that no measurement, no state and no order of calls tells it from the sound code. The tests compare: an
 //! edit that a rule excuses and the kit finds is a wrong rule.
 
-use policy::{Activation, Expr, Feature, Policy};
+mod clips;
+mod network;
+
+use policy::Policy;
 
 use super::kit_edits::Edit;
+use clips::one_side_alone;
+use network::{limit_unreached, quotient_unreached};
 
 /// A text with an edit of it.
 pub struct Edited<'a> {
@@ -44,6 +49,11 @@ const RULES: &[Rule] = &[
         at_the_start,
         "at equality the difference is the 0 that stands on the other side",
     ),
+    (not_both, "no number is below the low end and above the high one"),
+    (
+        overwritten,
+        "the line behind the loop writes the place that the loop writes too much",
+    ),
     (same_at_equality, "at equality both sides are the same number"),
     (
         behind_the_tables,
@@ -56,6 +66,10 @@ const RULES: &[Rule] = &[
     (
         limit_unreached,
         "no observation leads a layer to this limit: the first one is bounded, and so are the sums behind it",
+    ),
+    (
+        quotient_unreached,
+        "within what the layers reach the quotient stays below 1: every float was tried",
     ),
     (
         implied,
@@ -164,127 +178,6 @@ fn disjoint_bits(edited: &Edited) -> bool {
     let status = edited.within("decide") && (line.starts_with("| (") || line.contains("command->status = "));
     // what a mask leaves beside what its complement leaves
     status || line.contains("& ~") || line.contains("& below) |")
-}
-
-/// The words that say that a feature was clipped, and the one after the other the joins of two of them.
-struct Clips<'a> {
-    /// Name of the word, and the feature.
-    leaves: Vec<(&'a str, &'a Feature)>,
-    /// Name, left and right side.
-    joins: Vec<[&'a str; 3]>,
-}
-
-impl<'a> Clips<'a> {
-    fn of(edited: &'a Edited) -> Self {
-        let mut clips = Clips {
-            leaves: Vec::new(),
-            joins: Vec::new(),
-        };
-        for line in edited.body() {
-            let Some((name, value)) = line
-                .trim()
-                .strip_prefix("const uint32_t ")
-                .and_then(|line| line.split_once(" = "))
-            else {
-                continue;
-            };
-            let value = value.trim_end_matches(';');
-            if let [left, right] = value.split(" | ").collect::<Vec<_>>()[..] {
-                clips.joins.push([name, left, right]);
-            } else if let Some((_, right)) = value.split_once(" ^ ") {
-                let clipped = arguments(right, "_bits").first().copied().unwrap_or("");
-                let ends = format!("] = {clipped};");
-                let stored = edited
-                    .body()
-                    .iter()
-                    .find(|line| line.contains("->observation[") && line.ends_with(&ends));
-                let index = stored.and_then(|line| line.split(['[', ']']).nth(1)?.parse::<usize>().ok());
-                clips
-                    .leaves
-                    .extend(index.map(|index| (name, &edited.policy.features[index])));
-            }
-        }
-        clips
-    }
-
-    /// The features whose words are joined in that one.
-    fn members(&self, name: &str) -> Vec<&Feature> {
-        if let Some((_, feature)) = self.leaves.iter().find(|(own, _)| *own == name) {
-            return vec![feature];
-        }
-        let join = self.joins.iter().find(|[own, ..]| *own == name);
-        join.map_or(Vec::new(), |[_, left, right]| {
-            [self.members(left), self.members(right)].concat()
-        })
-    }
-}
-
-/// Whether no sound state and no measurement leads the feature beyond its clip.
-fn never_clips(feature: &Feature) -> bool {
-    let clip = feature.clip.unwrap_or(feature.bound);
-    clip.low < feature.bound.low && feature.bound.high < clip.high
-}
-
-/// Whether one is the other with the other sign, and nothing that is remembered goes in: both are clipped by the same.
-fn are_twins(one: &Feature, other: &Feature) -> bool {
-    let is_negated = match (&one.source, &other.source) {
-        (Expr::Sub(x, y), Expr::Sub(v, w)) => x == w && y == v,
-        _ => false,
-    };
-    let is_plain = |feature: &Feature| {
-        feature.filters.is_empty() && feature.offset == 0.0 && feature.clip.is_some_and(|clip| clip.low == -clip.high)
-    };
-    is_negated && is_plain(one) && is_plain(other) && one.scale == other.scale && one.clip == other.clip
-}
-
-fn one_side_alone(edited: &Edited) -> bool {
-    if edited.edit.old != "|" || !["^", "&"].contains(&edited.edit.new.as_str()) {
-        return false;
-    }
-    let Some((_, value)) = edited.line().split_once(" = ") else {
-        return false;
-    };
-    let [left, right] = value.trim_end_matches(';').split(" | ").collect::<Vec<_>>()[..] else {
-        return false;
-    };
-    if edited.within("decide") {
-        let zero = |name| edited.value_of(name).is_some_and(|value| all_inside(edited, value));
-        return edited.edit.new == "^" && (zero(left) || zero(right));
-    }
-    if !edited.within("sense") {
-        return false;
-    }
-    let clips = Clips::of(edited);
-    let (before, own) = (clips.members(left), clips.members(right));
-    let joined = before.iter().chain(&own);
-    let later: Vec<&Feature> = clips
-        .leaves
-        .iter()
-        .map(|(_, feature)| *feature)
-        .filter(|feature| !joined.clone().any(|known| known.name == feature.name))
-        .collect();
-    let says_later = |feature: &&Feature| later.iter().any(|other| are_twins(feature, other));
-    let never = |features: &[&Feature]| features.iter().all(|feature| never_clips(feature));
-    match edited.edit.new.as_str() {
-        // wrong where both are the same word other than 0
-        "^" => never(&before) || never(&own) || own.iter().all(says_later) || before.iter().all(says_later),
-        // wrong where one of them is 0 and the other is not
-        _ => joined
-            .clone()
-            .all(|feature| never_clips(feature) || says_later(feature)),
-    }
-}
-
-/// Whether the value asks if the chosen duty is outside of an interval that holds all duties.
-fn all_inside(edited: &Edited, value: &str) -> bool {
-    match arguments(value, "_outside")[..] {
-        ["chosen", low, high] => {
-            let (low, high) = (number(low), number(high));
-            let duties = edited.table("duties");
-            !duties.is_empty() && duties.iter().all(|duty| low <= Some(*duty) && Some(*duty) <= high)
-        }
-        _ => false,
-    }
 }
 
 fn between_duties(edited: &Edited) -> bool {
@@ -400,58 +293,6 @@ fn implied(edited: &Edited) -> bool {
     all_above && [">", ">="].contains(&comparison)
 }
 
-/// The largest magnitude that a limited activation may see, whatever the observation; nothing where the first layer is unbounded.
-fn reach(policy: &Policy, of: impl Fn(Activation) -> Option<f64>) -> Option<f64> {
-    let layers = &policy.layers;
-    let first = layers
-        .first()
-        .filter(|layer| layer.activation == Activation::Softsign)?;
-    let mut bounds = vec![1.0; first.outputs];
-    let mut reach: f64 = 0.0;
-    for layer in &layers[1..] {
-        let rows = layer.weights.chunks(layer.inputs).zip(&layer.bias);
-        let sums = rows.map(|(row, bias)| {
-            let products = row.iter().zip(&bounds).map(|(w, bound)| f64::from(w.abs()) * bound);
-            f64::from(bias.abs()) + products.sum::<f64>()
-        });
-        let sums: Vec<f64> = sums.collect();
-        let greatest = sums.iter().fold(0.0, |greatest: f64, x| greatest.max(*x));
-        // of the sum the share that the function is given
-        reach = reach.max(of(layer.activation).map_or(0.0, |share| share * greatest));
-        bounds = match layer.activation {
-            Activation::Softsign | Activation::Tanh => vec![1.0; layer.outputs],
-            // below in magnitude, or -1 where the sum is far below 0
-            Activation::Elu => sums.iter().map(|x| x.max(1.0)).collect(),
-            Activation::Relu | Activation::LeakyRelu { .. } | Activation::Silu | Activation::Identity => sums,
-            _ => return None,
-        };
-    }
-    Some(reach)
-}
-
-fn limit_unreached(edited: &Edited) -> bool {
-    let ["x", limit] = arguments(edited.line(), "_limit")[..] else {
-        return false;
-    };
-    let of_tanh = |activation| match activation {
-        Activation::Tanh => Some(1.0),
-        // by the tanh of half of it
-        Activation::Elu | Activation::Silu => Some(0.5),
-        _ => None,
-    };
-    let of_silu = |activation| (activation == Activation::Silu).then_some(1.0);
-    let reach = match (edited.within("tanh"), edited.within("silu")) {
-        (true, _) => reach(edited.policy, of_tanh),
-        (_, true) => reach(edited.policy, of_silu),
-        _ => None,
-    };
-    let limits = [limit, &edited.edit.new].map(|limit| bits(limit).map(f32::from_bits));
-    limit == edited.edit.old
-        && limits
-            .into_iter()
-            .all(|limit| limit.is_some_and(|limit| reach.is_some_and(|reach| 1.01 * reach < limit.into())))
-}
-
 /// A choice of the smaller or greater of two, and limits that put the limit itself in the place of an equal number.
 fn same_at_equality(edited: &Edited) -> bool {
     if !edited.is("<", "<=") && !edited.is(">", ">=") {
@@ -466,4 +307,27 @@ fn same_at_equality(edited: &Edited) -> bool {
     // the cap that is reached, which no status tells of
     let cap = edited.within("advance") && line.starts_with("const uint32_t f") && line.contains("_flag(v");
     of_two.iter().any(|text| line.contains(text)) || clamp || cap
+}
+
+fn not_both(edited: &Edited) -> bool {
+    edited.within("outside") && edited.line().contains("_flag(x < low) | ") && edited.is("|", "^")
+}
+
+/// A line of memories that moves on by one more: its last place gets the newest sample behind the loop.
+fn overwritten(edited: &Edited) -> bool {
+    let head = edited
+        .line()
+        .strip_prefix("for (i = ")
+        .and_then(|rest| rest.split_once("; i < "));
+    let Some(end) = head.and_then(|(_, rest)| bits(rest.split(';').next()?)) else {
+        return false;
+    };
+    let is_longer =
+        edited.is("<", "<=") || edited.edit.old == format!("{end}u") && bits(&edited.edit.new) == Some(end + 1);
+    let behind = &edited.lines[edited.edit.line..];
+    let body = behind.iter().position(|line| line.trim() == "}");
+    let next = body
+        .and_then(|at| behind.get(at + 1))
+        .is_some_and(|line| line.trim().starts_with(&format!("state->memory[{end}] = push")));
+    edited.within("advance") && is_longer && next
 }

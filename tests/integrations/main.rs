@@ -7,6 +7,7 @@ mod c2000;
 mod fmu;
 mod kit;
 mod kit_edits;
+mod kit_equal;
 mod rust;
 mod sfunction;
 

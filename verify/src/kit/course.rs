@@ -3,13 +3,14 @@
 //! ```text
 //!  directed   ends of ranges, bridged samples, coefficients at their ends   what a random run meets now and then
 //!  damaged    each number just outside of what a sound state holds          what no run meets
+//!  capped     a soft start that stands at the duty itself                   what a run meets by chance
 //!  tied       two actions of exactly equal value                            what a run meets once in millions of steps
 //!  random     the stream of `policyc verify`
 //! ```
 
 use codegen::backend::kit::Trace;
-use interp::{Controller, InputError, Real, Sample, State};
-use policy::Policy;
+use interp::{Controller, InputError, Real, Remembered, Sample, State};
+use policy::{Policy, Scalar};
 
 use super::damage::damages;
 use super::directed::{self, Move};
@@ -138,9 +139,34 @@ impl<'a, T: Real> Course<'a, T> {
         for damage in damages(self.policy, &fresh) {
             self.play(Event::Init)?;
             self.put(|state| damage.apply(state));
-            match damage.gives_no_number(&fresh, &usual) {
-                true => self.play_without_numbers(&usual)?,
-                false => self.play(Event::Step(usual.clone()))?,
+            let samples = damage.samples(self.policy, &usual);
+            match damage.gives_no_number(&fresh, &samples) {
+                true => self.play_without_numbers(&samples)?,
+                false => self.play(Event::Step(samples))?,
+            }
+        }
+        Ok(())
+    }
+
+    /// A cap of a soft start that is exactly the duty before it, and the numbers next to that: as much is not clipped.
+    pub fn capped(&mut self) -> Result<(), InputError> {
+        let usual = directed::usual(self.policy);
+        let scalar = self.policy.numeric_format.scalar();
+        for output in 0..self.policy.paths().len() {
+            if self.oracle.controller().state().output(output).soft_cap.is_none() {
+                continue;
+            }
+            let nearby: [fn(Scalar, f64) -> f64; 3] = [|_, x| x, Scalar::next_down, Scalar::next_up];
+            for near in nearby {
+                self.play(Event::Init)?;
+                self.play(Event::Step(usual.clone()))?;
+                let duty = self.oracle.controller().eval(&usual)?.decision(output).slewed;
+                let cap = Some(T::nearest(near(scalar, duty.to_f64())));
+                self.put(|state| {
+                    let own = state.output(output);
+                    state.set_output(output, Remembered { soft_cap: cap, ..own });
+                });
+                self.play(Event::Step(usual.clone()))?;
             }
         }
         Ok(())
@@ -224,9 +250,9 @@ impl<'a, T: Real> Course<'a, T> {
         near.into_iter().find(is_tied)
     }
 
-    /// Random moves up to so many control steps in all.
+    /// Random moves up to so many control steps in all; at least a quarter of them, however many came before.
     pub fn random(&mut self, steps: u32, seed: u64) -> Result<(), InputError> {
-        let left = u64::from(steps).saturating_sub(u64::from(self.trace.steps()));
+        let left = u64::from(steps.saturating_sub(self.trace.steps()).max(steps / 4));
         self.play(Event::Init)?;
         let mut stream = Stream::new(self.policy, seed, &[]);
         let chunk = self.oracle.next_chunk(&mut stream, left)?;

@@ -5,6 +5,8 @@ use std::ops::Range;
 use interp::{Coefficients, Controller, Real, Remembered, Sample, State};
 use policy::{Policy, Scalar};
 
+use super::directed::invalid;
+
 /// Which of the numbers of a sound, primed state stand at their upper ends, those of even places and those of odd ones: what a filter
 /// remembers at its farthest leads a feature beyond clip ends that no measurement reaches in a step, and a filter of two words
 /// goes farthest if they stand at different ends.
@@ -27,7 +29,16 @@ pub struct Damage<T> {
     check: CheckWord,
     /// `bad_count` and `primed`.
     counters: Option<(u32, u32)>,
+    /// The signal that has no valid sample in the step behind, so that its held number takes its place.
+    missing: Option<usize>,
 }
+
+/// Of a state with more numbers than this, such as one with long averages, not every one is put elsewhere alone.
+// a convention, as is everything that bounds a kit's memory: a number takes some 400 bytes
+const MOST_ALONE: usize = 64;
+
+/// Farther than any clip end, and yet no sum that a network makes of it leaves binary32.
+const FAR: f64 = 1e6;
 
 impl<T: Real> Damage<T> {
     fn of_numbers(numbers: Vec<(usize, T)>) -> Self {
@@ -35,7 +46,26 @@ impl<T: Real> Damage<T> {
             numbers,
             check: CheckWord::Kept,
             counters: None,
+            missing: None,
         }
+    }
+
+    /// With filters that are primed, and the check words that belong to the coefficients.
+    fn primed(numbers: Vec<(usize, T)>) -> Self {
+        Damage {
+            check: CheckWord::Anew,
+            counters: Some((0, 1)),
+            ..Damage::of_numbers(numbers)
+        }
+    }
+
+    /// The samples of the step behind it.
+    pub fn samples(&self, policy: &Policy, usual: &[Sample]) -> Vec<Sample> {
+        let mut samples = usual.to_vec();
+        if let Some((index, signal)) = self.missing.and_then(|index| Some((index, policy.signals.get(index)?))) {
+            samples[index] = invalid(policy.numeric_format.scalar(), signal);
+        }
+        samples
     }
 
     /// Whether a step from that state has a NaN among its observation or its Q values.
@@ -72,8 +102,8 @@ impl<T: Real> Damage<T> {
     }
 }
 
-/// Each number of the state just outside of what a sound state holds, alone and with the next one; all of them at either end; the counters at their ends
-/// and beyond; a soft start one step before its end.
+/// Each number of the state just outside of what a sound state holds, alone and with the next one; all of them at either end; each
+/// alone at its ends and far outside; the counters at their ends and beyond; a soft start one step before its end.
 pub fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>> {
     let (scalar, hold) = (policy.numeric_format.scalar(), policy.fallback.hold);
     let ends = fresh.sound_ends().into_iter().enumerate();
@@ -84,22 +114,13 @@ pub fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>
     };
     let mut damages = vec![all(|ends| ends.0), all(|ends| ends.1)];
     damages.extend(PRIMED_PATTERNS.map(|pattern| {
-        Damage {
-            check: CheckWord::Anew,
-            counters: Some((0, 1)),
-            ..Damage::of_numbers(
-                ends.iter()
-                    .map(|&(at, (low, high))| (at, if pattern[at % 2] { high } else { low }))
-                    .collect(),
-            )
-        }
+        let end = |&(at, (low, high)): &(usize, (T, T))| (at, if pattern[at % 2] { high } else { low });
+        Damage::primed(ends.iter().map(end).collect())
     }));
     // behind a network that passes a NaN on no Q value wins
-    damages.push(Damage {
-        check: CheckWord::Anew,
-        counters: Some((0, 1)),
-        ..Damage::of_numbers(ends.iter().map(|(at, _)| (*at, T::nearest(f64::NAN))).collect())
-    });
+    let nan = T::nearest(f64::NAN);
+    damages.push(Damage::primed(ends.iter().map(|(at, _)| (*at, nan)).collect()));
+    damages.extend(alone(policy, fresh));
     for &(at, (low, high)) in &ends {
         let (below, above) = (scalar.next_down(low.to_f64()), scalar.next_up(high.to_f64()));
         // what is no number gives one of many in the observation, and the contract does not say which
@@ -119,6 +140,10 @@ pub fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>
         (u32::MAX, 1),
         (0, 2),
         (0, u32::MAX),
+        // each of two neighbours among the four comparisons, and no other: wrongly joined they hide each other
+        (1 << 31, 1),
+        (u32::MAX, 2),
+        (0, 1 << 31),
     ];
     damages.extend(counters.map(|counters| Damage {
         counters: Some(counters),
@@ -129,6 +154,36 @@ pub fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>
         damages.extend(end_of_soft_start(policy, scalar, &own));
     }
     damages
+}
+
+/// Each number alone, with the others as `init` leaves them: at its ends, where one clip or limit of several alone is to show, at its
+/// ends with the other sign, and far outside. A held one that is far outside stands in for its signal: it leads an observation beyond
+/// clip ends that no sound state reaches. A number that no step reads may be anything.
+fn alone<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>> {
+    let one = |(at, ends): (usize, Option<(T, T)>)| {
+        let mut near: Vec<T> = Vec::new();
+        for x in ends.into_iter().flat_map(|(low, high)| [low, high, -low, -high]) {
+            if !near.iter().any(|known| known.bits() == x.bits()) {
+                near.push(x);
+            }
+        }
+        let missing = Some(at).filter(|at| *at < policy.signals.len());
+        let far = [FAR, -FAR, f64::NAN].map(|x| Damage {
+            missing,
+            ..Damage::primed(vec![(at, T::nearest(x))])
+        });
+        near.into_iter().map(move |x| Damage::primed(vec![(at, x)])).chain(far)
+    };
+    let ends = fresh.sound_ends();
+    // the memory of filters is what may be long, and it is neither first nor last
+    let memory = fresh.state().memory.len();
+    let stride = ends.len().div_ceil(MOST_ALONE);
+    let is_taken = |at: usize| match at.checked_sub(policy.signals.len()) {
+        Some(word) if word < memory => word % stride == 0 || word + 1 == memory,
+        _ => true,
+    };
+    let ends = ends.into_iter().enumerate();
+    ends.filter(|(at, _)| is_taken(*at)).flat_map(one).collect()
 }
 
 /// Where the parts of an output stand among the numbers of the state.

@@ -43,7 +43,20 @@ pub fn moves(policy: &Policy) -> Vec<Move> {
         moves.push(Event::Step(good.clone()));
     }
     clips(policy, &good, &mut moves);
-    let settled = std::iter::once(Move::Settle).chain(moves.into_iter().map(Move::Do));
+    // bad samples before the first good one: nothing bridges them
+    let blind: Vec<Move> = policy
+        .signals
+        .iter()
+        .take(1)
+        .flat_map(|signal| {
+            let bad = with(&good, 0, invalid(scalar, signal));
+            [bad.clone(), bad].map(|samples| Move::Do(Event::Step(samples)))
+        })
+        .collect();
+    let settled = blind
+        .into_iter()
+        .chain([Move::Settle])
+        .chain(moves.into_iter().map(Move::Do));
     let paths = policy.paths();
     let mappings = paths
         .iter()
@@ -132,18 +145,23 @@ fn ends(scalar: Scalar, signal: &Signal, range: Interval) -> impl Iterator<Item 
         .map(|(end, ulps)| nudged(end, ulps))
 }
 
+/// A sample that no converter and no range lets pass.
+pub fn invalid(scalar: Scalar, signal: &Signal) -> Sample {
+    match signal.adc {
+        // the furthest code, as some converters cannot leave their range by less
+        Some(adc) if adc.gain < 0.0 => Sample::Code(i32::MIN),
+        Some(_) => Sample::Code(i32::MAX),
+        None => sample_of(scalar, signal, f64::NAN),
+    }
+}
+
 /// K, K + 1 and K + 2 bad samples in a row, each time with good ones behind.
 fn runs(policy: &Policy, good: &[Sample], moves: &mut Vec<Event>) {
     let hold = policy.fallback.hold;
     let Some(signal) = policy.signals.first().filter(|_| hold <= LONGEST_RUN) else {
         return;
     };
-    let bad = match signal.adc {
-        // the furthest code, as some converters cannot leave their range by less
-        Some(adc) if adc.gain < 0.0 => Sample::Code(i32::MIN),
-        Some(_) => Sample::Code(i32::MAX),
-        None => sample_of(policy.numeric_format.scalar(), signal, f64::NAN),
-    };
+    let bad = invalid(policy.numeric_format.scalar(), signal);
     for length in hold..=hold + 2 {
         moves.extend((0..length).map(|_| Event::Step(with(good, 0, bad))));
         moves.extend((0..2).map(|_| Event::Step(good.to_vec())));

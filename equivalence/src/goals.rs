@@ -58,15 +58,16 @@ fn numbers(spec: Spec<'_>, sensed: &Sensed, choices: &[Chosen]) -> Option<Assump
 pub(crate) fn of(spec: Spec<'_>, emitted: &dyn Emitted) -> Result<Vec<Goal>, Refusal> {
     let given = Given::new(spec);
     let mut goals = Vec::new();
+    // all of a step is walked through before a goal is written: what is refused costs little
     let evaluated = emitted.eval(&given.state, &given.measurement)?;
     let choices = spec::choose(spec, emitted.to_cut()?, &evaluated.outputs);
     let command = spec::decide(spec, &given.state, &given.sensed, &choices);
-    let of_head = given.with(numbers(spec, &given.sensed, &choices));
-    eval(spec, emitted, &of_head, &evaluated, &command, &mut goals);
     let any = any_command(spec);
     let committed = emitted.commit(&given.state, &given.measurement, &any)?;
-    commit(spec, emitted, &given, &committed, &any, &mut goals);
     let stepped = emitted.step(&given.state, &given.measurement)?;
+    let of_head = given.with(numbers(spec, &given.sensed, &choices));
+    eval(spec, emitted, &of_head, &evaluated, &command, &mut goals);
+    commit(spec, emitted, &given, &committed, &any, &mut goals);
     step(spec, emitted, &given, &evaluated, &stepped, &mut goals)?;
     around(spec, emitted, &given, &evaluated, &mut goals)?;
     let asked = [evaluated.obligations, committed.obligations, stepped.obligations].concat();

@@ -11,6 +11,7 @@ mod machine;
 mod refusal;
 mod run;
 mod rust;
+mod simplify;
 mod smt;
 mod solver;
 mod spec;

@@ -1,5 +1,6 @@
 //! What both languages do alike: typed numbers as terms, aggregates, places in memory, and the merge of two courses.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -136,6 +137,11 @@ impl<'a> Machine<'a> {
     }
 
     pub(crate) fn read(&self, place: &Place) -> Result<Value, Wrong> {
+        self.look(place).map(Cow::into_owned)
+    }
+
+    /// What [`read`](Self::read) gives, without a copy of it: a state is long, and most of those who ask want one number of it.
+    pub(crate) fn look(&self, place: &Place) -> Result<Cow<'_, Value>, Wrong> {
         let mut value = self.store.get(place.root).ok_or("a place outside of memory")?;
         for step in &place.steps {
             value = match (step, value) {
@@ -145,10 +151,10 @@ impl<'a> Machine<'a> {
                 (Step::Member(name), Value::Union(members, bits)) => {
                     let kind = *members.get(name).ok_or_else(|| format!("no member `{name}`"))?;
                     // nobody can compute with what is not set
-                    return Ok(match *bits {
+                    return Ok(Cow::Owned(match *bits {
                         Some(term) => Value::Number(Number { term, kind }),
                         None => Value::Unset(Some(kind)),
-                    });
+                    }));
                 }
                 (Step::Element(index), Value::List(elements)) => {
                     let length = elements.len();
@@ -159,7 +165,7 @@ impl<'a> Machine<'a> {
                 (step, _) => return Err(format!("{step} of something that has none")),
             };
         }
-        Ok(value.clone())
+        Ok(Cow::Borrowed(value))
     }
 
     pub(crate) fn write(&mut self, place: &Place, new: Value) -> Result<(), Wrong> {
@@ -199,8 +205,9 @@ impl<'a> Machine<'a> {
     }
 
     /// The element of a list at an index that need not be known: one of all, and the index must be inside.
-    pub(crate) fn element(&mut self, list: &Value, index: Number) -> Result<Value, Wrong> {
-        let Value::List(elements) = list else {
+    pub(crate) fn element(&mut self, list: &Place, index: Number) -> Result<Value, Wrong> {
+        let list = self.look(list)?;
+        let Value::List(elements) = &*list else {
             return Err("an index into something that is no array".into());
         };
         if let Some(known) = self.terms.known(index.term) {
@@ -213,7 +220,6 @@ impl<'a> Machine<'a> {
         let inside = self
             .terms
             .order("bvult", index.term, self.terms.bits(elements.len() as u64, width));
-        self.obligations.push(inside);
         let mut numbers = elements
             .iter()
             .enumerate()
@@ -225,6 +231,7 @@ impl<'a> Machine<'a> {
             let this = self.terms.equal(index.term, self.terms.bits(n as u64, width));
             chosen.term = self.terms.choose(this, element?.term, chosen.term);
         }
+        self.obligations.push(inside);
         Ok(Value::Number(chosen))
     }
 

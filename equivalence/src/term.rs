@@ -2,10 +2,12 @@
 //!
 //! A number of the format is a bit vector, its bit pattern. Rounded sums, products and conversions are uninterpreted functions over
 //! patterns; comparisons are defined on the bits (`smt`), and a claim of its own shows that this definition is the one of IEEE 754.
-//! Terms fold only what is constant, so that loops with fixed bounds can be walked: everything else is left to the solver.
+//! Terms fold what is constant, so that loops with fixed bounds can be walked, and what [`simplify`](crate::simplify) knows: everything
+//! else is left to the solver.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 use std::rc::Rc;
 
 /// A term of a [`Terms`]; without meaning in another one.
@@ -69,7 +71,54 @@ pub(crate) struct Node {
 #[derive(Debug, Default)]
 struct Store {
     nodes: Vec<Rc<Node>>,
-    index: HashMap<Rc<Node>, Term>,
+    index: HashMap<Rc<Node>, Term, BuildHasherDefault<Mixed>>,
+}
+
+/// A hash by one multiplication a word: whose keys come out of one file has nobody to defend against, and a run makes them by the
+/// hundred thousand.
+#[derive(Debug, Default)]
+struct Mixed(u64);
+
+impl Mixed {
+    fn word(&mut self, word: u64) {
+        // 2^64 by the golden ratio, odd
+        self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+}
+
+impl Hasher for Mixed {
+    fn write(&mut self, bytes: &[u8]) {
+        for word in bytes.chunks(8) {
+            let mut whole = [0; 8];
+            whole[..word.len()].copy_from_slice(word);
+            self.word(u64::from_le_bytes(whole));
+        }
+    }
+
+    fn write_u8(&mut self, number: u8) {
+        self.word(number.into());
+    }
+
+    fn write_u32(&mut self, number: u32) {
+        self.word(number.into());
+    }
+
+    fn write_u64(&mut self, number: u64) {
+        self.word(number);
+    }
+
+    fn write_usize(&mut self, number: usize) {
+        self.word(number as u64);
+    }
+
+    fn write_isize(&mut self, number: isize) {
+        self.word(number as u64);
+    }
+
+    fn finish(&self) -> u64 {
+        // a table looks at the lowest bits, and a product mixes the highest
+        self.0 ^ (self.0 >> 32)
+    }
 }
 
 /// The store of all terms of a run: equal terms are one, which is what lets both sides of a goal meet.
@@ -163,9 +212,10 @@ impl Terms {
     }
 
     pub(crate) fn not(&self, x: Term) -> Term {
-        match self.known(x) {
-            Some(value) => self.truth(value == 0),
-            None => self.make(Op::Not, vec![x], Sort::Truth),
+        match (self.known(x), self.negated(x)) {
+            (Some(value), _) => self.truth(value == 0),
+            (None, Some(inner)) => inner,
+            (None, None) => self.make(Op::Not, vec![x], Sort::Truth),
         }
     }
 
@@ -174,7 +224,9 @@ impl Terms {
             (Some(0), _) | (_, Some(0)) => self.truth(false),
             (Some(_), _) => y,
             (_, Some(_)) => x,
-            _ => self.make(Op::And, vec![x, y], Sort::Truth),
+            _ => self
+                .simple_and(x, y)
+                .unwrap_or_else(|| self.make(Op::And, vec![x, y], Sort::Truth)),
         }
     }
 
@@ -183,7 +235,9 @@ impl Terms {
             (Some(1), _) | (_, Some(1)) => self.truth(true),
             (Some(_), _) => y,
             (_, Some(_)) => x,
-            _ => self.make(Op::Or, vec![x, y], Sort::Truth),
+            _ => self
+                .simple_or(x, y)
+                .unwrap_or_else(|| self.make(Op::Or, vec![x, y], Sort::Truth)),
         }
     }
 
@@ -195,7 +249,9 @@ impl Terms {
         match self.known(condition) {
             Some(0) => no,
             Some(_) => yes,
-            None => self.make(Op::Choose, vec![condition, yes, no], self.sort(yes)),
+            None => self
+                .simple_choice(condition, yes, no)
+                .unwrap_or_else(|| self.make(Op::Choose, vec![condition, yes, no], self.sort(yes))),
         }
     }
 
@@ -203,7 +259,9 @@ impl Terms {
     pub(crate) fn equal(&self, x: Term, y: Term) -> Term {
         match (self.known(x), self.known(y)) {
             (Some(a), Some(b)) => self.truth(a == b),
-            _ => self.make(Op::Equal, vec![x, y], Sort::Truth),
+            _ => self
+                .simple_equal(x, y)
+                .unwrap_or_else(|| self.make(Op::Equal, vec![x, y], Sort::Truth)),
         }
     }
 
@@ -215,7 +273,8 @@ impl Terms {
         {
             return self.bits(value, width);
         }
-        self.make(Op::Bits(name), vec![x, y], Sort::Bits(width))
+        self.simple_binary(name, x, y)
+            .unwrap_or_else(|| self.make(Op::Bits(name), vec![x, y], Sort::Bits(width)))
     }
 
     /// `bvnot`, `bvneg`.
@@ -224,7 +283,9 @@ impl Terms {
         match (name, self.known(x)) {
             ("bvnot", Some(a)) => self.bits(!a, width),
             ("bvneg", Some(a)) => self.bits(a.wrapping_neg(), width),
-            _ => self.make(Op::Bits(name), vec![x], Sort::Bits(width)),
+            _ => self
+                .simple_unary(name, x)
+                .unwrap_or_else(|| self.make(Op::Bits(name), vec![x], Sort::Bits(width))),
         }
     }
 
@@ -248,7 +309,9 @@ impl Terms {
         match self.known(x) {
             Some(value) => self.bits(value >> low, width),
             None if width == self.width(x) => x,
-            None => self.make(Op::Extract(high, low), vec![x], Sort::Bits(width)),
+            None => self
+                .each_constant(x, |constant| self.extract(constant, high, low))
+                .unwrap_or_else(|| self.make(Op::Extract(high, low), vec![x], Sort::Bits(width))),
         }
     }
 
@@ -260,8 +323,15 @@ impl Terms {
             _ if width < from => self.extract(x, width - 1, 0),
             Some(value) if sign => self.bits(signed(value, from) as u64, width),
             Some(value) => self.bits(value, width),
-            None if sign => self.make(Op::SignExtend(width - from), vec![x], Sort::Bits(width)),
-            None => self.make(Op::ZeroExtend(width - from), vec![x], Sort::Bits(width)),
+            None => self
+                .each_constant(x, |constant| self.resize(constant, width, sign))
+                .unwrap_or_else(|| {
+                    let op = match sign {
+                        true => Op::SignExtend(width - from),
+                        false => Op::ZeroExtend(width - from),
+                    };
+                    self.make(op, vec![x], Sort::Bits(width))
+                }),
         }
     }
 

@@ -128,8 +128,8 @@ fn a_sum_that_overflows_is_not_proved() {
     let value = first + text[first..].find("{\n").unwrap() + 2;
     let end = value + text[value..].find(',').unwrap();
     text.replace_range(value..end, "2147483647");
-    let claims = watched(|watch| eva::prove_sources(task(&policy), &files, Some("prove_q_values"), watch)).unwrap();
-    let claim = claims.iter().find(|claim| claim.name == "q-values-runs").unwrap();
+    let claims = watched(|watch| eva::prove_sources(task(&policy), &files, Some("prove_network"), watch)).unwrap();
+    let claim = claims.iter().find(|claim| claim.name == "network-runs").unwrap();
     assert_eq!(claim.verdict, Verdict::Unproven);
     assert!(
         claim.details.iter().any(|detail| detail.contains("overflow")),

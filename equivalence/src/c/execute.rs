@@ -156,16 +156,19 @@ impl<'a, 'u> Walk<'a, 'u> {
     fn assign(&mut self, target: &Expr, op: Option<Binary>, value: &Expr) -> Result<(), Wrong> {
         let mut new = self.value(value)?;
         let place = self.place(target)?;
-        let old = self.machine.read(&place)?;
-        if let Some(op) = op {
-            let result = self.binary(op, number(&old)?, number(&new)?)?;
+        let (old, kind) = {
+            let old = self.machine.look(&place)?;
+            let kind = match &*old {
+                Value::Number(old) => Some(old.kind),
+                Value::Unset(kind) => *kind,
+                _ => None,
+            };
+            (op.map(|_| number(&old)), kind)
+        };
+        if let (Some(op), Some(old)) = (op, old) {
+            let result = self.binary(op, old?, number(&new)?)?;
             new = Value::Number(result);
         }
-        let kind = match &old {
-            Value::Number(old) => Some(old.kind),
-            Value::Unset(kind) => *kind,
-            _ => None,
-        };
         if let (Some(kind), Value::Number(value)) = (kind, &new) {
             new = Value::Number(self.implicitly(*value, kind)?);
         }

@@ -176,37 +176,69 @@ fn without_comments(text: &str) -> String {
 }
 
 /// Tokens of a line.
+// by bytes: every file is read twice, once for each reader, and all that the C of a controller holds is ASCII
 pub(crate) fn split(text: &str, line: usize) -> Result<Vec<Token>, Wrong> {
-    let mut out = Vec::new();
-    let mut rest = text.trim_start();
-    while let Some(first) = rest.chars().next() {
-        let (kind, after) = if first.is_ascii_alphabetic() || first == '_' {
-            let (name, after) = take(rest, |c, _| c.is_ascii_alphanumeric() || c == '_');
-            (Kind::Name(name.to_owned()), after)
-        } else if first.is_ascii_digit() {
-            // the sign of an exponent belongs to the number, but not in hexadecimal
-            let is_hex = rest.starts_with("0x") || rest.starts_with("0X");
-            let signed = |c: char, before: char| !is_hex && matches!(c, '+' | '-') && matches!(before, 'e' | 'E');
-            let (digits, after) = take(rest, |c, before| {
-                c.is_ascii_alphanumeric() || c == '.' || signed(c, before)
-            });
-            (Kind::Number(digits.to_owned()), after)
-        } else if first == '"' {
-            let inner = &rest[1..];
-            let end = closing(inner).ok_or("a text without its end")?;
-            (Kind::Text(inner[..end].to_owned()), &inner[end + 1..])
-        } else {
-            let mut symbols = SYMBOLS.iter().chain(&MORE);
-            // the first byte tells nearly all of them apart
-            let byte = rest.as_bytes()[0];
-            let symbol = symbols.find(|symbol| symbol.as_bytes()[0] == byte && rest.starts_with(**symbol));
-            let symbol = symbol.ok_or_else(|| format!("the character `{first}`"))?;
-            (Kind::Symbol(symbol), &rest[symbol.len()..])
+    let bytes = text.as_bytes();
+    let mut out = Vec::with_capacity(text.len() / 4);
+    let mut at = 0;
+    while let Some(&first) = bytes.get(at) {
+        let (kind, end) = match first {
+            b' ' | b'\t'..=b'\r' => {
+                at += 1;
+                continue;
+            }
+            b'a'..=b'z' | b'A'..=b'Z' | b'_' => {
+                let end = end_of(bytes, at, |byte, _| byte.is_ascii_alphanumeric() || byte == b'_');
+                (Kind::Name(text[at..end].to_owned()), end)
+            }
+            b'0'..=b'9' => {
+                // the sign of an exponent belongs to the number, but not in hexadecimal
+                let is_hex = matches!(bytes[at..], [b'0', b'x' | b'X', ..]);
+                let signed = |byte, before| !is_hex && matches!(byte, b'+' | b'-') && matches!(before, b'e' | b'E');
+                let end = end_of(bytes, at, |byte, before| {
+                    byte.is_ascii_alphanumeric() || byte == b'.' || signed(byte, before)
+                });
+                (Kind::Number(text[at..end].to_owned()), end)
+            }
+            b'"' => {
+                let inner = &text[at + 1..];
+                let end = closing(inner).ok_or("a text without its end")?;
+                (Kind::Text(inner[..end].to_owned()), at + end + 2)
+            }
+            _ => {
+                let mut symbols = SYMBOLS.iter().chain(&MORE);
+                // the first byte tells nearly all of them apart
+                let is_it = |symbol: &&&str| {
+                    let symbol = symbol.as_bytes();
+                    symbol[0] == first && (symbol.len() == 1 || bytes[at..].starts_with(symbol))
+                };
+                match symbols.find(is_it) {
+                    Some(symbol) => (Kind::Symbol(symbol), at + symbol.len()),
+                    None => {
+                        let other = text[at..].chars().next().unwrap_or(char::REPLACEMENT_CHARACTER);
+                        // such as a space that does not break a line
+                        if other.is_whitespace() {
+                            at += other.len_utf8();
+                            continue;
+                        }
+                        return Err(format!("the character `{other}`"));
+                    }
+                }
+            }
         };
         out.push(Token { kind, line });
-        rest = after.trim_start();
+        at = end;
     }
     Ok(out)
+}
+
+/// One past the last byte of the word that begins at `start`; `belongs` is asked of a byte and the one before it.
+fn end_of(bytes: &[u8], start: usize, belongs: impl Fn(u8, u8) -> bool) -> usize {
+    let mut end = start + 1;
+    while bytes.get(end).is_some_and(|byte| belongs(*byte, bytes[end - 1])) {
+        end += 1;
+    }
+    end
 }
 
 /// Where the text ends; a quote behind a backslash does not end it.
@@ -219,14 +251,4 @@ fn closing(inner: &str) -> Option<usize> {
         }
     }
     None
-}
-
-fn take(text: &str, mut belongs: impl FnMut(char, char) -> bool) -> (&str, &str) {
-    let mut before = ' ';
-    let end = text.find(|c| {
-        let goes_on = belongs(c, before);
-        before = c;
-        !goes_on
-    });
-    text.split_at(end.unwrap_or(text.len()))
 }

@@ -170,11 +170,11 @@ impl Walk<'_, '_> {
 
     pub(super) fn load(&mut self, expr: &Expr) -> Result<Value, Wrong> {
         let place = self.place(expr)?;
-        match self.machine.read(&place)? {
+        match &*self.machine.look(&place)? {
             // an array stands for the address of its first element
             Value::List(_) => Ok(Value::Place(place.element(0))),
             Value::Unset(_) => Err("a read before anything was written".into()),
-            value => Ok(value),
+            value => Ok(value.clone()),
         }
     }
 
@@ -192,10 +192,7 @@ impl Walk<'_, '_> {
             return Err("an index into a value".into());
         };
         match place.steps.pop() {
-            Some(Step::Element(0)) => {
-                let list = self.machine.read(&place)?;
-                self.machine.element(&list, index)
-            }
+            Some(Step::Element(0)) => self.machine.element(&place, index),
             _ => Err("an index that depends on the data, into a part of an array".into()),
         }
     }

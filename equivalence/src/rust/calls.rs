@@ -91,7 +91,7 @@ impl Walk<'_, '_> {
 
     fn run_network(&mut self, observation: crate::machine::Place) -> Result<Value, Wrong> {
         let observation = self.dereferenced(observation)?;
-        let observation = terms_of(&self.machine.read(&observation)?)?;
+        let observation = terms_of(&*self.machine.look(&observation)?)?;
         self.network.observations.push(observation);
         Ok(Value::List(self.network.answer()))
     }
@@ -238,9 +238,9 @@ impl Walk<'_, '_> {
             Value::List(items) => Ok(items),
             Value::Place(place) => {
                 let place = self.dereferenced(place)?;
-                match self.machine.read(&place)? {
+                match &*self.machine.look(&place)? {
                     // references already: what `line_sum` gets is an iterator
-                    Value::List(items) if items.iter().any(|item| matches!(item, Value::Place(_))) => Ok(items),
+                    Value::List(items) if items.iter().any(|item| matches!(item, Value::Place(_))) => Ok(items.clone()),
                     Value::List(items) => Ok((0..items.len())
                         .map(|n| Value::Place(place.clone().element(n)))
                         .collect()),

@@ -244,14 +244,13 @@ impl<'a, 'u> Walk<'a, 'u> {
         let at_index = self.number(&index.index, Some(U64))?;
         let list = self.place(&index.expr)?;
         let list = self.dereferenced(list).map_err(|message| at(expr, message))?;
-        let list = self.machine.read(&list).map_err(|message| at(expr, message))?;
         self.machine
             .element(&list, at_index)
             .map_err(|message| at(expr, message))
     }
 
     fn kind_at(&self, place: &Place) -> Option<Kind> {
-        match self.machine.read(place).ok()? {
+        match &*self.machine.look(place).ok()? {
             Value::Number(number) => Some(number.kind),
             Value::List(list) => list
                 .first()
@@ -299,10 +298,13 @@ impl<'a, 'u> Walk<'a, 'u> {
 
     /// Through references to what they refer to.
     pub(super) fn dereferenced(&self, mut place: Place) -> Result<Place, Wrong> {
-        while let Value::Place(inner) = self.machine.read(&place)? {
+        loop {
+            let inner = match &*self.machine.look(&place)? {
+                Value::Place(inner) => inner.clone(),
+                _ => return Ok(place),
+            };
             place = inner;
         }
-        Ok(place)
     }
 
     fn constant(&mut self, name: &str) -> Result<Place, Wrong> {

@@ -27,7 +27,7 @@ pub(crate) struct Unit {
 
 impl Unit {
     pub(crate) fn read(file: &str, text: &str) -> Result<Self, Refusal> {
-        let parsed = syn::parse_file(text)
+        let parsed = syn::parse_file(&without_comments(text))
             .map_err(|error| Refusal::at(file, error.span().start().line, format!("no Rust: {error}")))?;
         let mut unit = Unit {
             file: file.to_owned(),
@@ -83,6 +83,26 @@ impl Unit {
             .filter_map(|field| Some((field.ident.as_ref()?.to_string(), field.ty)));
         self.records.insert(item.ident.to_string(), named.collect());
     }
+}
+
+/// Attributes of the emitted code that say nothing about what it computes.
+const SILENT: [&str; 3] = ["#[inline(always)]", "#[inline]", "#[allow(dead_code)]"];
+
+/// Lines that are comments or say how to compile become empty, so that all others keep their numbers. A comment of documentation is an
+/// attribute to a parser, and one of those costs as much as a statement.
+fn without_comments(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for line in text.split_inclusive('\n') {
+        let is_silent = line.trim_start().starts_with("//") || SILENT.contains(&line.trim());
+        // such a line may stand inside of a text or of another comment: as long as it does not end it, nothing around it changes
+        let ends_none = !["\"", "/*", "*/"].iter().any(|end| line.contains(end));
+        out.push_str(if is_silent && ends_none {
+            &line[line.trim_end_matches(['\r', '\n']).len()..]
+        } else {
+            line
+        });
+    }
+    out
 }
 
 fn is_controller(of: &Type) -> bool {
@@ -146,4 +166,22 @@ pub(crate) fn joined(path: &syn::Path) -> String {
 /// `what` with its line.
 pub(crate) fn at(node: &impl Spanned, what: impl Into<Wrong>) -> (usize, Wrong) {
     (node.span().start().line, what.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_comment_becomes_an_empty_line() {
+        let text = "/// what f does\n    // how\r\nfn f() {} // here\n//";
+        assert_eq!(without_comments(text), "\n\r\nfn f() {} // here\n");
+    }
+
+    #[test]
+    fn a_line_that_could_end_a_text_or_a_comment_stays() {
+        for text in ["\"\n// \" + f()\n", "/*\n// */ f()\n", "/*\n// /* */\n*/\n"] {
+            assert_eq!(without_comments(text), text);
+        }
+    }
 }

@@ -75,8 +75,8 @@ impl Writer<'_> {
         }
     }
 
-    /// A command that the caller may have changed in whatever way.
-    pub fn any_command(&mut self) {
+    /// A command, a variable of that name, that the caller may have changed in whatever way.
+    pub fn any_command(&mut self, command: &str) {
         for output in self.policy.paths().iter().enumerate() {
             for (member, any) in [
                 ("duty", "any_bits"),
@@ -84,10 +84,11 @@ impl Writer<'_> {
                 ("action_index", "any_word"),
             ] {
                 let place = self.member(member, output);
-                self.text.line(format!("{place} = {any};"));
+                let member = place.strip_prefix("command").unwrap_or(&place);
+                self.text.line(format!("{command}{member} = {any};"));
             }
         }
-        self.text.line("command.status = any_word;");
+        self.text.line(format!("{command}.status = any_word;"));
     }
 
     /// A check that may hold for finite numbers only.

@@ -22,6 +22,9 @@ const LITTLE: Machine = Machine("x86_32");
 const BIG: Machine = Machine("ppc_32");
 /// A step is also looked through for NaN and infinities. What is finite on one machine is so on the other: both round alike.
 const STEP: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any), (BIG, Numbers::Any), (LITTLE, Numbers::Finite)];
+/// Slices of a run, and the most runs: with more, each is mostly the start of Frama-C.
+const PART: usize = 40;
+const MOST_PARTS: usize = 4;
 /// The choice of an action takes most of the time of a step, and what follows takes any.
 const ACTION: &str = "choose";
 /// Arithmetic alone; without a NaN from a sound state and finite measurements.
@@ -36,6 +39,8 @@ pub(super) const FINE: &[u8] = &[2];
 pub(super) const COARSE: &[u8] = &[0];
 /// What has no bytes in another order: arithmetic alone.
 pub(super) const ONE: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any)];
+/// The same from inputs that are integers: where no NaN arises of them, none has to be looked at.
+pub(super) const ONE_FINITE: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Finite)];
 
 /// A function of the driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,6 +53,8 @@ pub(super) struct Entry {
     pub stated: Vec<Stated>,
     /// Machines and numbers that it is analysed under.
     pub runs: &'static [(Machine, Numbers)],
+    /// Into how many runs each of these is cut, which together are the whole.
+    pub parts: usize,
     /// Functions of the policy, without its prefix, whose contract stands for their text. Another entry shows the contract.
     pub assumed: Vec<String>,
     /// Functions of the policy, without its prefix, in which cases are not kept apart.
@@ -78,7 +85,8 @@ pub(super) fn driver(policy: &Policy) -> Driver {
     };
     writer.inputs();
     // the longest runs first, so that no core waits for one of them at the end
-    let mut entries = vec![writer.q_values(), writer.marked()];
+    let mut entries = Vec::from_iter(writer.network());
+    entries.extend([writer.q_values(), writer.marked()]);
     entries.extend(writer.slices());
     entries.extend([
         writer.others(),
@@ -179,17 +187,10 @@ impl Writer<'_> {
             },
             stated,
             runs: BITS_AND_FINITE,
-            assumed: if self.is_integer() {
-                Vec::new()
-            } else {
-                vec!["q_values".to_owned()]
-            },
-            merged: self.curves(),
-            precisions: if self.is_integer() {
-                self.sums_precisions()
-            } else {
-                COARSE_FIRST
-            },
+            parts: 1,
+            assumed: vec![if self.is_integer() { "network" } else { "q_values" }.to_owned()],
+            merged: Vec::new(),
+            precisions: COARSE_FIRST,
         }
     }
 
@@ -250,6 +251,7 @@ impl Writer<'_> {
             about: "one step from every sound state, every measurement",
             stated: claims,
             runs: if self.takes_output_as_it_is() { BOTH } else { STEP },
+            parts: 1,
             assumed: std::iter::once(ACTION.to_owned()).chain(self.flips()).collect(),
             merged: Vec::new(),
             precisions: match self.answer() {
@@ -300,6 +302,7 @@ impl Writer<'_> {
             about: "one step from every bit pattern of the state, every measurement",
             stated: claims,
             runs: BOTH,
+            parts: 1,
             assumed: vec![ACTION.to_owned()],
             merged: Vec::new(),
             precisions: FINE,
@@ -311,6 +314,7 @@ impl Writer<'_> {
         const FIRST: &str =
             "the memory is the input itself then: `y + k(x - y)` with `y = x`, which intervals take for two numbers";
         const WHY: &str = "a low-pass so fast that it would need too many slices";
+        let n = self.n().to_owned();
         let words = self.invariant.words.clone();
         let mut calls = Vec::new();
         for index in 0..self.invariant.memory {
@@ -330,6 +334,14 @@ impl Writer<'_> {
                 continue;
             };
             self.not_stated.push(first);
+            if calls.is_empty() {
+                self.text.lines([
+                    format!("static {n}_state any_sound;"),
+                    format!("static {n}_measurement any_measured;"),
+                    format!("static {n}_command any_command;"),
+                    String::new(),
+                ]);
+            }
             self.slice_function(index, &word, &kept);
             let pairs = ends.windows(2).map(|pair| {
                 let (low, high) = (self.number.down(pair[0]), self.number.up(pair[1]));
@@ -340,9 +352,20 @@ impl Writer<'_> {
         if calls.is_empty() {
             return None;
         }
-        self.text.line("void prove_slices(void)");
-        self.text.line("{");
-        self.text.lines(calls);
+        self.text.lines([
+            "void prove_slices(void)",
+            "{",
+            "sound(&any_sound);",
+            "measure(&any_measured);",
+        ]);
+        self.any_command("any_command");
+        // side by side: the time of a run is that of its slices
+        let parts = calls.len().div_ceil(PART).min(MOST_PARTS);
+        for (part, calls) in calls.chunks(calls.len().div_ceil(parts)).enumerate() {
+            self.text.line(format!("#if PART == {part}"));
+            self.text.lines(calls.iter());
+            self.text.line("#endif");
+        }
         self.close();
         Some(Entry {
             function: "prove_slices",
@@ -352,6 +375,7 @@ impl Writer<'_> {
                 "Behind the first sample, the memories of low-pass filters and what stands behind them stay within their ends.",
             )],
             runs: ONE,
+            parts,
             assumed: vec![ACTION.to_owned()],
             merged: Vec::new(),
             precisions: COARSE_FIRST,
@@ -365,21 +389,18 @@ impl Writer<'_> {
         self.text.lines([
             "{".to_owned(),
             format!("{n}_state state;"),
-            format!("{n}_measurement measured;"),
-            format!("{n}_command command;"),
             format!("{n}_front front;"),
-            "sound(&state);".to_owned(),
+            // made once: a copy costs a tenth of it
+            "state = any_sound;".to_owned(),
             format!("state.{} = Frama_C_{kind}_interval(low, high);", word.place),
             "state.primed = 1u;".to_owned(),
-            "measure(&measured);".to_owned(),
         ]);
-        self.any_command();
         // what decides has no part in it: whatever it says of the state
         self.text.lines([
-            format!("{n}_sense(&state, &measured, &front);"),
+            format!("{n}_sense(&state, &any_measured, &front);"),
             "front.sound = Frama_C_unsigned_int_interval(0u, 1u);".to_owned(),
             "front.usable = Frama_C_unsigned_int_interval(0u, 1u);".to_owned(),
-            format!("{n}_advance(&state, &front, &command);"),
+            format!("{n}_advance(&state, &front, &any_command);"),
         ]);
         for (at, other) in kept {
             self.keeps("slices", *at, other);

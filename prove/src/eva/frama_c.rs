@@ -71,6 +71,7 @@ pub(super) struct Analysis<'a> {
     pub entry: &'a Entry,
     pub machine: Machine,
     pub numbers: Numbers,
+    pub part: usize,
 }
 
 /// Analyses the entry, ever more precisely until everything is shown. What is shown with little precision is shown.
@@ -97,6 +98,7 @@ fn command(analysis: Analysis<'_>, precision: u8, table: &Path) -> Command {
         policy,
         machine,
         numbers,
+        part,
         ..
     } = analysis;
     let Entry {
@@ -119,7 +121,7 @@ fn command(analysis: Analysis<'_>, precision: u8, table: &Path) -> Command {
     command.args(["-eva", FILE, "-main", entry, "-machdep", machine.0]);
     // without __GNUC__ the portable text is taken; the two flags keep the preprocessor from announcing excess precision
     command.arg(format!(
-        "-cpp-extra-args=-U__GNUC__ -D{}_PORTABLE -msse2 -mfpmath=sse{finite} -I.",
+        "-cpp-extra-args=-U__GNUC__ -D{}_PORTABLE -msse2 -mfpmath=sse{finite} -DPART={part} -I.",
         policy.to_uppercase()
     ));
     command.args(["-warn-special-float", special]);
@@ -161,10 +163,11 @@ fn once(analysis: Analysis<'_>, precision: u8, stop: &Stop) -> Result<Found, pro
         labels,
         machine,
         numbers,
+        part,
         ..
     } = analysis;
     let Entry { function, assumed, .. } = analysis.entry;
-    let table = folder.join(format!("{function}-{}-{numbers:?}.csv", machine.0));
+    let table = folder.join(format!("{function}-{}-{numbers:?}-{part}.csv", machine.0));
     let mut command = command(analysis, precision, &table);
     let output = program::run(&mut command, PATIENCE, stop);
     let seconds = begun.elapsed().as_secs_f64();

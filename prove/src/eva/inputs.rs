@@ -15,6 +15,9 @@ impl Writer<'_> {
             format!("#include \"{n}.c\""),
             "#include \"__fc_builtin.h\"".to_owned(),
             String::new(),
+        ]);
+        self.network_contract();
+        self.text.lines([
             "/* every bit pattern of the type */".to_owned(),
             format!("extern volatile {kind} any_bits;"),
             "extern volatile uint32_t any_word;".to_owned(),
@@ -158,6 +161,33 @@ impl Writer<'_> {
         self.text.lines(["  @*/", &prototype, "#else", "/*@"]);
         self.text.lines(bits.lines());
         self.text.lines(["  @*/", &prototype, "#endif", ""]);
+    }
+
+    /// The network in integers: its inputs lie in the box of section 6b, which is asked for at each call.
+    fn network_contract(&mut self) {
+        let Some(scales) = policy::scales::of(self.policy) else {
+            return;
+        };
+        let n = self.n().to_owned();
+        let (features, last) = (scales.inputs.len(), self.policy.outputs() - 1);
+        self.text.lines([
+            format!("enum {{ INPUTS = sizeof((({n}_values *)0)->input) / sizeof((({n}_values *)0)->input[0]) }};"),
+            "/*@".to_owned(),
+        ]);
+        for (index, input) in scales.inputs.iter().enumerate() {
+            let (low, high) = (input.low, input.high);
+            self.text.line(format!(
+                "  @ requires box_{index}: {low} <= values->input[{index}] <= {high};"
+            ));
+        }
+        self.text.lines([
+            format!("  @ requires rest: \\initialized(values->input + ({features} .. INPUTS - 1));"),
+            format!("  @ assigns values->q[0 .. {last}] \\from values->input[0 .. INPUTS - 1];"),
+            format!("  @ ensures written: \\initialized(values->q + (0 .. {last}));"),
+            "  @*/".to_owned(),
+            format!("static void {n}_network({n}_values *values);"),
+            String::new(),
+        ]);
     }
 
     /// What an observation's size is not above: a power of two, which C and ACSL read as the same number.

@@ -39,6 +39,8 @@ struct Job<'a> {
     entry: &'a Entry,
     machine: Machine,
     numbers: Numbers,
+    /// Which of the entry's parts.
+    part: usize,
 }
 
 impl Prover for Eva {
@@ -159,18 +161,19 @@ fn put(files: &BTreeMap<String, String>, driver: &str) -> std::io::Result<tempfi
 }
 
 fn jobs(driver: &Driver) -> Vec<Job<'_>> {
-    let of = |entry| {
-        move |(machine, numbers): &(Machine, Numbers)| Job {
-            entry,
-            machine: *machine,
-            numbers: *numbers,
+    let mut jobs = Vec::new();
+    for entry in &driver.entries {
+        for &(machine, numbers) in entry.runs {
+            let job = |part| Job {
+                entry,
+                machine,
+                numbers,
+                part,
+            };
+            jobs.extend((0..entry.parts).map(job));
         }
-    };
-    driver
-        .entries
-        .iter()
-        .flat_map(|entry: &Entry| entry.runs.iter().map(of(entry)))
-        .collect()
+    }
+    jobs
 }
 
 /// Runs side by side, as many as there are cores.
@@ -214,6 +217,7 @@ fn run_all(
                         entry: job.entry,
                         machine: job.machine,
                         numbers: job.numbers,
+                        part: job.part,
                     };
                     let found = frama_c::analyse(analysis, watch.stop);
                     let mut results = results.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -258,7 +262,9 @@ fn rest_on_others(parts: &mut [(&Entry, Vec<Claim>)]) {
 fn claims_of(task: Task<'_>, entry: &Entry, runs: &[(Job<'_>, &Found)], tool: &str) -> Vec<Claim> {
     let short = entry.function.trim_start_matches("prove_").replace('_', "-");
     let seconds = runs.iter().map(|(_, found)| found.seconds).sum();
-    let settings: Vec<String> = runs.iter().map(|(job, _)| setting(job)).collect();
+    let mut settings: Vec<String> = runs.iter().map(|(job, _)| setting(job)).collect();
+    // of a run in parts
+    settings.dedup();
     let claim = |name: &str, text: &str, judged: Vec<(Verdict, Vec<String>)>| {
         let verdict = judged
             .iter()
@@ -283,8 +289,11 @@ fn claims_of(task: Task<'_>, entry: &Entry, runs: &[(Job<'_>, &Found)], tool: &s
         let own = runs.iter().filter(move |(job, _)| job.numbers == numbers);
         own.map(|(job, found)| alarms(job, found)).collect::<Vec<_>>()
     };
-    let mut claims = vec![claim("runs", NO_ERROR, no_error(Numbers::Any))];
     let finite = no_error(Numbers::Finite);
+    let any = no_error(Numbers::Any);
+    // where all inputs are integers, finite numbers are all that there are
+    let any = if any.is_empty() { finite.clone() } else { any };
+    let mut claims = vec![claim("runs", NO_ERROR, any)];
     claims.extend((!finite.is_empty()).then(|| claim(FINITE, NO_NAN, finite)));
     for stated in &entry.stated {
         let judged = runs

@@ -10,17 +10,23 @@ use plant::Parameters;
 use crate::diagnosis::Diagnosis;
 use crate::drive::Model;
 use crate::findings::Verdict;
+use crate::problem::duty_accuracy;
 use crate::words::needs;
 
-/// A trim of the edges that moves the duty by less than this share of a period is none.
-// a microvolt in a volt of the source: no sensor shows it, and the fit leaves such remains. In the file it would read as a finding
-const NO_TRIM: f64 = 1e-6;
+/// A trim of the edges below this share of what edges are known to do ([`duty_accuracy`]) is none.
+// 0.5 ns at 10 kHz, 0.2 ns at 100 kHz: below the scatter of any driver's delay, and 5 to 50 uV in a volt of the source. Long records
+// resolve such remains of a fit, and in the file a delay of 1e-10 s would read as a finding
+const NO_TRIM: f64 = 0.01;
 
 /// Where the trim is written.
 const EDGES: [&str; 2] = ["switch.turn_on_delay", "switch.turn_off_delay"];
 
-fn told(trim: f64) -> f64 {
-    if trim.abs() < NO_TRIM { 0.0 } else { trim }
+fn told(trim: f64, f_sw: f64) -> f64 {
+    if trim.abs() < NO_TRIM * duty_accuracy(f_sw) {
+        0.0
+    } else {
+        trim
+    }
 }
 
 /// The extended model as one plant: the sampling instant and the trim of the edges are among its parameters.
@@ -28,7 +34,7 @@ fn told(trim: f64) -> f64 {
 pub fn as_plant(model: &Model, trim: f64) -> Parameters {
     let mut p = model.plant.clone();
     let t_sw = p.t_sw();
-    let trim = told(trim);
+    let trim = told(trim, p.converter.f_sw);
     // the same edges as in `drive::simulate`, so that the file shows what was fitted
     p.switch.turn_off_delay += trim.max(0.0) * t_sw;
     p.switch.turn_on_delay += (-trim).max(0.0) * t_sw;
@@ -71,7 +77,8 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     if is_described(diagnosis) {
         text += "# The table [empirical] is a correction of the duty that describes what no cause explains. It is no cause and no physics.\n";
     }
-    written(diagnosis, text, &extended_plant(diagnosis), told(diagnosis.trim))
+    let trim = told(diagnosis.trim, diagnosis.given.model.plant.converter.f_sw);
+    written(diagnosis, text, &extended_plant(diagnosis), trim)
 }
 
 /// Whether the extended model has an empirical term.
@@ -88,7 +95,8 @@ pub fn partial_toml(diagnosis: &Diagnosis) -> Option<String> {
         return None;
     }
     let state = diagnosis.attribution.state();
-    let trim = told(state.starts.trim_or_none(state.model.plant.converter.f_sw));
+    let f_sw = state.model.plant.converter.f_sw;
+    let trim = told(state.starts.trim_or_none(f_sw), f_sw);
     let mut text = String::from(
         "# PARTIAL: these causes do not explain the records. Their values imitate something else, and are no measurement.\n",
     );
@@ -186,4 +194,21 @@ fn notes(diagnosis: &Diagnosis, after: &Parameters, trim: f64) -> BTreeMap<&'sta
         );
     }
     notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::told;
+
+    /// At each frequency a tenth of a nanosecond is what a fit leaves, and two nanoseconds are what a gate does.
+    #[test]
+    fn a_trim_is_told_from_where_it_can_matter() {
+        for f_sw in [1e4, 1e5, 3e5] {
+            for sign in [-1.0, 1.0] {
+                let (remains, edges) = (sign * 1e-10 * f_sw, sign * 2e-9 * f_sw);
+                assert_eq!(told(remains, f_sw), 0.0, "{f_sw} Hz");
+                assert_eq!(told(edges, f_sw), edges, "{f_sw} Hz");
+            }
+        }
+    }
 }

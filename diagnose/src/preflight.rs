@@ -45,6 +45,8 @@ enum Reading {
     OtherSwitch,
     /// The record is of another kind of converter.
     Kind(Topology),
+    /// The source gave so many times the voltage of the plant file.
+    Source(f64),
 }
 
 /// A record that is better read in another way.
@@ -64,6 +66,7 @@ impl Reading {
             Reading::Probe(n, times) => record.measured[n].iter_mut().for_each(|value| *value /= times),
             Reading::OtherSwitch => record.duty.iter_mut().for_each(|duty| *duty = 1.0 - *duty),
             Reading::Kind(_) => {}
+            Reading::Source(times) => record.v_in_ratio *= times,
             Reading::Shifted(by) => {
                 for values in &mut record.measured {
                     let old = std::mem::take(values);
@@ -76,7 +79,7 @@ impl Reading {
         record
     }
 
-    fn words(self, record: &Record) -> String {
+    fn words(self, record: &Record, model: &Model) -> String {
         let name = &record.name;
         match self {
             Reading::Shifted(by) => {
@@ -104,6 +107,12 @@ impl Reading {
                 "{name}: the duty looks like that of the lower switch, 1 - d; if so, turn it by a map file: scale = -1.0, offset = 1.0 for the duty \
                  under [columns]"
             ),
+            Reading::Source(times) => format!(
+                "{name}: looks like a source of about {}, {:+.0} % beside the plant file's: was the supply set so? then v_in under [converter] is to \
+                 be this; if not, v_out may be off by a gain",
+                crate::words::si(model.plant.converter.v_in * record.v_in_ratio * times, "V"),
+                100.0 * (times - 1.0)
+            ),
             Reading::Kind(kind) => format!(
                 "{name}: the record looks like that of a {0}, and the model is of another kind; if so: topology = \"{0}\" under [converter] of the \
                  plant file",
@@ -115,7 +124,7 @@ impl Reading {
     /// Whether the list of causes has nothing that does the same to this record.
     fn is_no_cause(self, record: &Record) -> bool {
         match self {
-            Reading::Shifted(_) | Reading::Exchanged(..) => false,
+            Reading::Shifted(_) | Reading::Exchanged(..) | Reading::Source(_) => false,
             Reading::Probe(..) | Reading::Kind(_) => true,
             // a duty that stands still is another by 1 - 2 d, which a source voltage or an offset may be as well; one that moves goes the
             // other way
@@ -177,7 +186,7 @@ fn best_reading(problem: &Problem, null: &State, index: usize) -> Option<Misread
     let found = tried.map(|reading| (mean_square(Some(reading)), reading));
     let (left, reading) = found.min_by(|a, b| a.0.total_cmp(&b.0))?;
     (left < LEFT * as_it_is).then(|| Misread {
-        words: reading.words(record),
+        words: reading.words(record, &null.model),
         reading,
         is_sure: left < WRONG && reading.is_no_cause(record),
     })
@@ -203,6 +212,7 @@ fn tried(problem: &Problem, null: &State, index: usize) -> Vec<Reading> {
         );
     }
     list.push(Reading::OtherSwitch);
+    list.extend(other_source(record, &null.model).map(Reading::Source));
     let own = null.model.plant.converter.topology;
     let kinds = [Topology::Buck, Topology::Boost, Topology::BuckBoost];
     list.extend(kinds.into_iter().filter(|kind| *kind != own).map(Reading::Kind));
@@ -225,6 +235,19 @@ fn is_nearer(problem: &Problem, null: &State, index: usize, (n, times): (usize, 
         });
     let (own, other) = errors.fold((0.0, 0.0), |(a, b), (own, other)| (a + own, b + other));
     other < own
+}
+
+/// How far a measured source voltage may lie from the one that the output shows: two meters of half a percent, and losses.
+const AGREES: f64 = 0.03;
+
+/// The source voltage that a record shows over that of the plant file, if it is another; a measured one has to agree.
+fn other_source(record: &Record, model: &Model) -> Option<f64> {
+    let own = model.plant.converter.v_in * record.v_in_ratio;
+    let times = shown_source(record, model)? / own;
+    let measured = record.measured[3].iter().copied().filter(|v| v.is_finite());
+    let measured: Vec<f64> = measured.collect();
+    let agrees = measured.is_empty() || (median(measured) / own / times - 1.0).abs() < AGREES;
+    (agrees && (times - 1.0).abs() > OTHER_SOURCE).then_some(times)
 }
 
 /// Source voltage that a record's voltages and duties show, without the losses that all records share; nothing if the current may rest.

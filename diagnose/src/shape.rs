@@ -92,22 +92,10 @@ fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &
     let count = values.iter().filter(|v| **v != 0.0).count() as f64;
     // what noise alone would not have left
     let excess = (total - count).max(f64::MIN_POSITIVE);
-    let line = strongest_line(problem, &state.residual, n).filter(|line| line.share > LINE);
-    let of_line = line.map_or(0.0, |line| {
-        0.5 * count * (line.amplitude / problem.sigma[n]).powi(2) / excess
-    });
-    if let Some(line) = line.filter(|_| of_line > OF_EXCESS) {
-        return format!(
-            "a line at {:.0} Hz of {:.3} ({:.0} % of the power)",
-            line.frequency,
-            line.amplitude,
-            100.0 * line.share
-        );
-    }
     if let Some((row, share)) = burst(values, total) {
         let t = record.time[row];
         let step = match is_stepped(record, row) {
-            true => "; the duty or the load steps there",
+            true => ", where the duty or the load steps",
             false => "",
         };
         return format!(
@@ -115,35 +103,41 @@ fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &
             100.0 * share
         );
     }
-    if let Some(words) = behind_steps(problem, record, values, excess) {
-        return words;
-    }
-    if let Some(words) = kicks(record, values, excess) {
-        return words;
-    }
-    if let Some(share) = trembling(problem, values, excess) {
+    let place = place(problem, record, values, excess);
+    if let Some(line) = strongest_line(problem, &state.residual, n).filter(|line| line.share > LINE) {
+        let of_line = 0.5 * count * (line.amplitude / problem.sigma[n]).powi(2) / excess;
+        let place = place.filter(|_| of_line < OF_EXCESS);
         return format!(
-            "a trembling at about the frequency at which the filter swings ({:.0} % of the power), without a step behind it: edges that \
-             jitter or pulses that are lost kick it at random",
-            100.0 * share
-        );
-    }
-    if let Some(line) = line {
-        return format!(
-            "a line at {:.0} Hz of {:.3} ({:.0} % of the power) and more",
+            "a line at {:.0} Hz of {:.3} ({:.0} % of the power){}",
             line.frequency,
             line.amplitude,
-            100.0 * line.share
+            100.0 * line.share,
+            place.map_or(String::new(), |place| format!(", {place}"))
         );
     }
-    if !is_slow {
-        return "fast, without a line that stands out: a trembling from row to row, larger than the noise that the record shows elsewhere"
-            .to_owned();
+    match place {
+        Some(place) => place,
+        None if is_slow => followed(problem, (index, n), values),
+        None => "fast, without a line that stands out: a trembling from row to row".to_owned(),
     }
-    followed(problem, (index, n), values)
 }
 
-/// A line is what is left if it holds this share of what noise does not: of two things the larger.
+/// Where what is left lies, if it lies at places in time or in a band.
+fn place(problem: &Problem, record: &Record, values: &[f64], excess: f64) -> Option<String> {
+    let trembles = || {
+        let share = trembling(problem, values, excess)?;
+        Some(format!(
+            "a trembling at about the frequency at which the filter swings ({:.0} % of what is not noise), without steps before it: edges that \
+             jitter or pulses that are lost kick it at random",
+            100.0 * share
+        ))
+    };
+    behind_steps(problem, record, values, excess)
+        .or_else(|| kicks(record, values, excess))
+        .or_else(trembles)
+}
+
+/// A line is all that is to be said if it holds this share of what noise does not: of two things the larger.
 const OF_EXCESS: f64 = 0.5;
 /// What is left lies behind the steps if the rows there hold this share of it, ...
 const BEHIND: f64 = 0.75;

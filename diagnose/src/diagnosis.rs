@@ -260,7 +260,11 @@ fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<Str
             true => Vec::new(),
             false => partial_gain(problem, attribution, pair),
         },
-        not_detectable: unseen::hidden(problem, attribution),
+        // of records that are not read as they were made nothing follows for any cause
+        not_detectable: match found.is_misread() {
+            true => Vec::new(),
+            false => unseen::hidden(problem, attribution),
+        },
         next_experiments: match explained {
             true => crate::next::experiments(problem, attribution, say),
             false => Vec::new(),

@@ -30,6 +30,8 @@ const TURNED: f64 = 0.5;
 /// no cause of the list makes a signal 1.8 times as large.
 const PROBES: [f64; 4] = [2.0, 10.0, 0.5, 0.1];
 const AS_PROBE: f64 = 1.1;
+/// A load current that is off by more than this does not confirm what the load is: losses and two meters are less.
+const AGREES: f64 = 1.2;
 /// Share of the current that losses may take: of the voltage, that is, at the load. A diode of half a volt at 4 V makes a tenth.
 const CURRENT_LOST: f64 = 0.15;
 /// Share of its mean by which an inductor current has to lie outside of its ripple, at whichever instant it is sampled: losses of a
@@ -251,7 +253,12 @@ fn probes(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]
     let is_alone = known.len() == 1 && !(n == 0 && probe.is_some_and(|probe| ratio(probe, 1.0) > 5.0));
     let confirmed = n == 3 || is_continuous(record, parameters) && !is_alone;
     let is_current = n == 1 || n == 2;
-    let sure = confirmed && (!is_current || known.iter().any(|(other, _)| other + n == 3));
+    // the other current has to be as it should: where both are off, the load is another
+    let agrees = |(other, own): &(usize, Beside)| match other {
+        1 => own.apart <= APART,
+        _ => ratio(own.times, 1.0) < AGREES,
+    };
+    let sure = confirmed && (!is_current || known.iter().any(|one| one.0 + n == 3 && agrees(one)));
     let (Some(probe), true, false) = (probe, sure, sources[n].stated) else {
         return Vec::new();
     };

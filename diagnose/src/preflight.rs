@@ -282,6 +282,9 @@ fn is_nearer(problem: &Problem, null: &State, index: usize, (n, times): (usize, 
 /// How far a measured source voltage may lie from the one that the output shows: two meters of half a percent, and losses.
 const AGREES: f64 = 0.03;
 
+/// Supplies that are set wrong: one twice or half of what it should be is rather a probe of another ratio.
+const SUPPLIES: std::ops::Range<f64> = 0.55..1.8;
+
 /// The source voltage that a record shows over that of the plant file, if it is another; a measured one has to agree.
 fn other_source(record: &Record, model: &Model) -> Option<f64> {
     let own = model.plant.converter.v_in * record.v_in_ratio;
@@ -289,7 +292,7 @@ fn other_source(record: &Record, model: &Model) -> Option<f64> {
     let measured = record.measured[3].iter().copied().filter(|v| v.is_finite());
     let measured: Vec<f64> = measured.collect();
     let agrees = measured.is_empty() || (median(measured) / own / times - 1.0).abs() < AGREES;
-    (agrees && (times - 1.0).abs() > OTHER_SOURCE).then_some(times)
+    (agrees && SUPPLIES.contains(&times) && (times - 1.0).abs() > OTHER_SOURCE).then_some(times)
 }
 
 /// A drawn current over the set one from which on the load is another: meters and resistors are off by some percent together.

@@ -264,7 +264,7 @@ fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<Str
     let (problem, attribution) = (&found.problem, &found.attribution);
     let explained = found.verdict != Verdict::Unexplained;
     let mut odd = found.odd.clone();
-    odd.extend(spikes(problem, &found.outliers));
+    odd.extend(noise::spikes(problem, &found.outliers));
     odd.extend(sources);
     let mut near = String::new();
     if !explained && !found.is_misread() {
@@ -282,7 +282,11 @@ fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<Str
             true => Vec::new(),
             false => partial_gain(problem, attribution, pair),
         },
-        not_detectable: unseen::hidden(problem, attribution),
+        // of records that are not read as they were made nothing follows for any cause
+        not_detectable: match found.is_misread() {
+            true => Vec::new(),
+            false => unseen::hidden(problem, attribution),
+        },
         next_experiments: match explained {
             true => crate::next::experiments(problem, attribution, say),
             false => Vec::new(),
@@ -409,26 +413,6 @@ fn by_text<'a>(records: impl Iterator<Item = &'a Record>) -> Vec<String> {
     }
     let said = |(text, names): (&str, Vec<&str>)| format!("{}: {text}", names.join(", "));
     list.into_iter().map(said).collect()
-}
-
-/// Spikes that are listed by their places; more are counted.
-const LISTED: usize = 3;
-
-/// What is said of outliers.
-fn spikes(problem: &Problem, outliers: &[Outlier]) -> Option<String> {
-    let place = |one: &Outlier| {
-        let record = &problem.records[one.record];
-        format!(
-            "{} of {} at t = {:.6} s",
-            CHANNEL_NAMES[one.channel], record.name, record.time[one.row]
-        )
-    };
-    let listed: Vec<String> = outliers.iter().take(LISTED).map(place).collect();
-    let more = match outliers.len().saturating_sub(LISTED) {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    (!outliers.is_empty()).then(|| format!("spikes of single rows are left out: {}{more}", listed.join(", ")))
 }
 
 /// What was repaired, assumed or noticed.

@@ -58,6 +58,9 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
     let (mut problem, mut null, mut outliers) = prepared(train.clone(), base, work);
     let misread = preflight::readings(&problem, &null);
     let mut odd: Vec<String> = misread.iter().map(|one| one.words.clone()).collect();
+    for words in odd.iter().chain(&noise::spikes(&problem, &outliers)) {
+        say(Progress::Noticed(words));
+    }
     if let Some(fault) = preflight::answer(&problem, &misread) {
         return Examined::misread(problem, null, outliers, fault);
     }
@@ -261,9 +264,7 @@ fn prepared(train: Vec<Record>, base: &Model, work: &Work) -> (Problem, State, V
     unsure_levels::free(&mut problem, base, &mut null);
     null = State::settle(&problem, base, &null.starts, None);
     let outliers = noise::outliers(&problem, &null.residual);
-    for one in &outliers {
-        problem.masked[one.record][one.channel][one.row] = true;
-    }
+    problem.leave_out(&outliers);
     null = State::settle(&problem, base, &null.starts, None);
     problem.sigma = noise::sigma(&problem, &null.residual);
     null = State::settle(&problem, base, &null.starts, None);

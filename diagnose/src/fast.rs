@@ -22,12 +22,19 @@ use crate::words::si;
 
 /// Lowest frequency, over the sampling rate: slower structure shows in means of ten rows (`shape`).
 const LOWEST: f64 = 0.04;
-/// And so many times what the filter rings at: a ring that ends is wide.
+/// And so many times what the filter rings at: a ring that ends is wide. Below it a line has to go on through the whole record.
 const ABOVE_RING: f64 = 2.0;
-/// Chance that a channel of a healthy record shows a line. Four channels of a record are looked at, so that one in 500 records does.
+/// Stretches in which such a line is looked for, and the share of its amplitude, in its own phase, that each has at least: a ring begins
+/// anew at each step, and three of four stretches hold its phase by chance once in hundreds.
+const STRETCHES: usize = 4;
+const GOES_ON: f64 = 0.5;
+/// Chance that a channel of a healthy record shows a line, and again that it shows one at a whole part of the rate. Four channels of a
+/// record are looked at, so that one in 250 records does.
 const CHANCE: f64 = 5e-4;
-/// Fewest rows: of fewer neither floor nor colour is known well enough to tell a line ten times as high.
-const FEWEST: usize = 120;
+/// Fewest rows: of fewer neither floor nor colour is known at all.
+const FEWEST: usize = 48;
+/// A power at half the rate has one degree of freedom and others have two: 17 and 10 are passed once in 25000.
+const OF_HALF: f64 = 1.7;
 /// Neighbours that make the floor, at least and at most, in steps of the record's own resolution, and those next to a line that do not.
 const NEIGHBOURS: [usize; 2] = [24, 120];
 const GUARD: usize = 3;
@@ -87,16 +94,16 @@ pub fn structures(problem: &Problem, null: &State, state: &State) -> Vec<Structu
             };
             let [left, before] =
                 [left, before].map(|all| all.into_iter().skip(first).step_by(step).collect::<Vec<f64>>());
-            let lowest = LOWEST.max(ABOVE_RING * ring * step as f64);
+            let above_ring = ABOVE_RING * ring * step as f64;
             // what is as fast as the rows themselves is folded down to anywhere
-            if lowest >= 0.5 {
+            if above_ring >= 0.5 {
                 continue;
             }
             // a coarse converter leaves patterns of its own
             if record.lattice[n] > 1.5 * problem.sigma[n] {
                 continue;
             }
-            let peaks = peaks(&left, &before, lowest);
+            let peaks = peaks(&left, &before, LOWEST, above_ring);
             if peaks.is_empty() {
                 continue;
             }
@@ -134,10 +141,10 @@ const PARTS: [(f64, &str); 6] = [
 fn words(peak: &Peak, rows: usize, rate: f64, sigma: f64, unit: &'static str) -> String {
     // half of what the record resolves
     let same = |other: f64| (peak.frequency - other).abs() * (rows as f64) < 0.5;
-    let part = PARTS.iter().find(|(part, _)| same(part.recip()));
+    let part = part(peak.frequency, rows);
     let mains = MAINS.iter().find(|mains| same(**mains / rate));
     let like = match (part, mains) {
-        (Some((_, word)), _) => {
+        (Some(word), _) => {
             format!("the same in every {word} row: a dither, a limit cycle, a duty that goes between two counts")
         }
         (_, Some(mains)) => format!("that of mains of {mains} Hz"),
@@ -153,9 +160,10 @@ fn words(peak: &Peak, rows: usize, rate: f64, sigma: f64, unit: &'static str) ->
     )
 }
 
-/// The lines of a course; a simulator that is off by its accuracy leaves that share of a line that was there `before`.
+/// The lines of a course from the frequency `lowest` on, those below `above_ring` only if they go on throughout; a simulator that is off by
+/// its accuracy leaves that share of a line that was there `before`.
 #[must_use]
-pub fn peaks(values: &[f64], before: &[f64], lowest: f64) -> Vec<Peak> {
+pub fn peaks(values: &[f64], before: &[f64], lowest: f64, above_ring: f64) -> Vec<Peak> {
     let known = values.iter().filter(|v| **v != 0.0).count();
     // the first row of a stretch never counts, and a step leaves out a row or two
     if values.len() < FEWEST || 2 * known < values.len() {
@@ -185,13 +193,16 @@ pub fn peaks(values: &[f64], before: &[f64], lowest: f64) -> Vec<Peak> {
         let floor = floor + ACCURACY * ACCURACY * was[at] / colour[at];
         let ratio = power[at] / floor.max(f64::MIN_POSITIVE);
         // |X|^2 / n of a sine of amplitude A is n A^2 / 4, at half the rate n A^2
-        let quarter = if (0.5 - frequency) * (values.len() as f64) < 0.5 {
-            1.0
-        } else {
-            0.25
-        };
+        let is_half = (0.5 - frequency) * (values.len() as f64) < 0.5;
+        let quarter = if is_half { 1.0 } else { 0.25 };
         let amplitude = (raw[at] / (quarter * known as f64)).sqrt();
-        if ratio > level(values.len(), near) && amplitude > LEAST {
+        let least = level(values.len(), near).min(match part(frequency, values.len()) {
+            Some(_) if is_half => OF_HALF * level_of_parts(near),
+            Some(_) => level_of_parts(near),
+            None => f64::INFINITY,
+        });
+        let holds = frequency > above_ring || goes_on(values, frequency);
+        if ratio > least && amplitude > LEAST && holds {
             list.push(Peak {
                 frequency,
                 amplitude,
@@ -200,6 +211,35 @@ pub fn peaks(values: &[f64], before: &[f64], lowest: f64) -> Vec<Peak> {
         }
     }
     list
+}
+
+/// The whole part of the rate that a frequency is, within half of what the record resolves.
+fn part(frequency: f64, rows: usize) -> Option<&'static str> {
+    let same = |part: f64| (frequency - part.recip()).abs() * (rows as f64) < 0.5;
+    PARTS.iter().find(|(part, _)| same(*part)).map(|(_, word)| *word)
+}
+
+/// Whether each stretch of a course holds the sine of a frequency as the whole does.
+fn goes_on(values: &[f64], frequency: f64) -> bool {
+    let sums: Vec<(f64, f64)> = (0..STRETCHES)
+        .map(|n| {
+            let [from, to] = [n, n + 1].map(|n| n * values.len() / STRETCHES);
+            (from..to).fold((0.0, 0.0), |(re, im), row| {
+                let angle = TAU * frequency * row as f64;
+                (re + values[row] * libm::cos(angle), im + values[row] * libm::sin(angle))
+            })
+        })
+        .collect();
+    let (re, im) = sums.iter().fold((0.0, 0.0), |(re, im), sum| (re + sum.0, im + sum.1));
+    let square = re * re + im * im;
+    let least = GOES_ON / STRETCHES as f64 * square;
+    sums.iter().all(|sum| sum.0 * re + sum.1 * im > least)
+}
+
+/// The ratio that noise passes with [`CHANCE`] at one of the whole parts of the rate, each of which has two maxima.
+fn level_of_parts(wide: usize) -> f64 {
+    let shape = LN_2 * LN_2 * wide as f64;
+    shape * (libm::pow(2.0 * PARTS.len() as f64 / CHANCE, 1.0 / shape) - 1.0)
 }
 
 /// The ratio that noise of `rows` rows passes with [`CHANCE`], over a floor of `wide` neighbours.
@@ -279,6 +319,19 @@ fn colour(raw: &[f64], (fine, wide): (f64, usize)) -> Vec<f64> {
         .collect()
 }
 
+/// Sum of squares of a course between two frequencies, over the rate.
+pub(crate) fn band(values: &[f64], low: f64, high: f64) -> f64 {
+    let known = values.iter().filter(|v| **v != 0.0).count();
+    if known == 0 {
+        return 0.0;
+    }
+    let power = periodogram(values, known);
+    let bins = power.len() - 1;
+    let [from, to] = [low, high].map(|share| ((2.0 * share * bins as f64) as usize).min(bins));
+    // a mean over all frequencies is the mean square
+    power[from..=to].iter().sum::<f64>() / (bins + 1) as f64 * known as f64
+}
+
 /// Squares of the Fourier transform over the number of values, from 0 to half the rate, at least twice as fine as the record resolves.
 fn periodogram(values: &[f64], known: usize) -> Vec<f64> {
     let length = (2 * values.len()).next_power_of_two();
@@ -325,133 +378,4 @@ fn transform(re: &mut [f64], im: &mut [f64]) {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::f64::consts::TAU;
-
-    use super::{LOWEST, peaks, transform};
-
-    /// Twelve uniform numbers of a linear congruential generator make a normal one.
-    struct Noise(u64);
-
-    impl Noise {
-        fn uniform(&mut self) -> f64 {
-            self.0 = self
-                .0
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        }
-
-        fn normal(&mut self) -> f64 {
-            (0..12).map(|_| self.uniform()).sum()
-        }
-
-        /// Noise of a colour: an autoregression of two poles, heavy tails, or steps of a converter.
-        fn course(&mut self, rows: usize, [a, b]: [f64; 2], kind: usize) -> Vec<f64> {
-            let mut last = [0.0; 2];
-            let mut list = Vec::new();
-            for n in 0..rows + 100 {
-                let mut fresh = self.normal();
-                if kind == 1 && self.uniform() > 0.45 {
-                    fresh *= 3.0;
-                }
-                let value = fresh + a * last[0] + b * last[1];
-                last = [value, last[0]];
-                if n >= 100 {
-                    list.push(if kind == 2 { value.round() + 1e-9 } else { value });
-                }
-            }
-            list
-        }
-    }
-
-    const COLOURS: [[f64; 2]; 8] = [
-        [0.0, 0.0],
-        [0.5, 0.0],
-        [0.8, 0.0],
-        [-0.5, 0.0],
-        [-0.8, 0.0],
-        [0.3, 0.3],
-        [0.9, -0.5],
-        [0.0, -0.5],
-    ];
-
-    #[test]
-    fn noise_of_any_colour_and_length_shows_no_line() {
-        let mut noise = Noise(11);
-        let (mut all, mut alarms) = (0, Vec::new());
-        for rows in [120, 150, 250, 400, 600, 1000, 2000] {
-            for colour in COLOURS {
-                for kind in 0..3 {
-                    for _ in 0..12 {
-                        let values = noise.course(rows, colour, kind);
-                        all += 1;
-                        if let Some(peak) = peaks(&values, &values, LOWEST).first() {
-                            alarms.push((rows, colour, kind, *peak));
-                        }
-                    }
-                }
-            }
-        }
-        println!("{} of {all}: {alarms:?}", alarms.len());
-        // one in a hundred records, of four channels each: a record holds four of these courses
-        assert!(400 * alarms.len() <= all, "{} of {all}: {alarms:?}", alarms.len());
-    }
-
-    /// What a limit cycle, a dither and a line of a disturber look like, ten times as high in the spectrum as the noise.
-    #[test]
-    fn a_line_ten_times_as_high_as_the_noise_is_seen() {
-        let mut noise = Noise(12);
-        for kind in 0..4 {
-            let (mut seen, mut all) = (0, 0);
-            for rows in [120, 180, 250, 600, 2000] {
-                for colour in COLOURS {
-                    for _ in 0..6 {
-                        let mut values = noise.course(rows, colour, 0);
-                        let f = [0.25, 0.5, 0.07 + 0.4 * (noise.uniform() + 0.5), 1.0 / 3.0][kind];
-                        let angle = TAU * f;
-                        let [a, b] = colour;
-                        // spectrum of the noise at the line
-                        let re = 1.0 - a * angle.cos() - b * (2.0 * angle).cos();
-                        let im = a * angle.sin() + b * (2.0 * angle).sin();
-                        let floor = 1.0 / (re * re + im * im);
-                        // a line of amplitude A is n A^2 / 4 there, at half the rate n A^2
-                        let share = if kind == 1 { 1.0 } else { 0.25 };
-                        let size = 10.0 * (floor / (share * rows as f64)).sqrt();
-                        let phase = if kind == 1 { 0.25 * TAU } else { TAU * noise.uniform() };
-                        for (n, value) in values.iter_mut().enumerate() {
-                            *value += size * (angle * n as f64 + phase).sin();
-                        }
-                        all += 1;
-                        let found = peaks(&values, &[0.0].repeat(rows), LOWEST);
-                        let hit = found.iter().any(|peak| {
-                            (peak.frequency - f).abs() * (rows as f64) < 1.0
-                                && (peak.amplitude / size - 1.0).abs() < 0.5
-                        });
-                        seen += usize::from(hit || size < super::LEAST);
-                    }
-                }
-            }
-            println!("kind {kind}: {seen} of {all}");
-            assert!(100 * seen >= 95 * all, "kind {kind}: {seen} of {all}");
-        }
-    }
-
-    #[test]
-    fn the_transform_is_the_sum_that_defines_it() {
-        let mut noise = Noise(13);
-        let values: Vec<f64> = (0..16).map(|_| noise.normal()).collect();
-        let (mut re, mut im) = (values.clone(), vec![0.0; 16]);
-        transform(&mut re, &mut im);
-        for k in 0..16 {
-            let sum = |f: fn(f64) -> f64| -> f64 {
-                let each = values.iter().enumerate();
-                each.map(|(n, v)| v * f(TAU * (k * n) as f64 / 16.0)).sum()
-            };
-            assert!(
-                (re[k] - sum(f64::cos)).abs() < 1e-9 && (im[k] + sum(f64::sin)).abs() < 1e-9,
-                "{k}"
-            );
-        }
-    }
-}
+mod tests;

@@ -150,8 +150,14 @@ pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHA
     // a trim that is fitted to a record that judges would flatter the model
     problem.trim_held = true;
     sampling::decide(&mut problem, extended);
-    let remarks = other_chains(&mut problem, base, extended, trim);
+    let mut remarks = other_chains(&mut problem, base, extended, trim);
     let mut before = State::settle(&problem, base, &problem.first_starts(), None);
+    let spikes = noise::outliers(&problem, &before.residual);
+    if !spikes.is_empty() {
+        remarks.extend(noise::spikes(&problem, &spikes));
+        problem.leave_out(&spikes);
+        before = State::settle(&problem, base, &before.starts, None);
+    }
     if unsure_levels::free(&mut problem, extended, &mut before) {
         before = State::settle(&problem, base, &before.starts, None);
     }

@@ -17,6 +17,8 @@ pub struct Ideal {
     pub v_in: f64,
     /// Inductance over the period, ohm.
     slope: f64,
+    /// Switching periods in a swing of the filter.
+    swing: f64,
 }
 
 impl Ideal {
@@ -32,7 +34,13 @@ impl Ideal {
             topology: p.topology,
             v_in: p.v_in * v_in_ratio,
             slope: p.inductance * p.f_sw,
+            swing: std::f64::consts::TAU * (p.inductance * p.capacitance).sqrt() * p.f_sw,
         }
+    }
+
+    /// Switching periods in a swing of the filter, at the duty of a buck; a boost's is slower.
+    pub fn swing(&self) -> f64 {
+        self.swing
     }
 
     /// Output voltage that a duty makes, V.

@@ -3,7 +3,7 @@
 use crate::exact::Exact;
 use crate::median::median;
 use crate::problem::{Problem, dot};
-use crate::record::{CHANNELS, Record};
+use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 
 /// An outlier differs from its neighbours by more than this many standard deviations beyond their own spread. Normal noise does
 /// so in one row of 1e15, at half of it in one of 1e6; at double, a wrong bit of 16 steps of the noise would pass.
@@ -65,8 +65,8 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
                 .min(most(problem, n, scale))
                 .max(least)
                 .hypotenuse(metered(problem, n)),
-            // too few points to tell noise from anything: a share of what is measured, that of a good meter
-            (true, false) => 2e-3 * scale,
+            // too few points to tell noise from anything: a share of what is measured, that of a good meter, or what is said of a poorer one
+            (true, false) => (2e-3 * scale).max(stated(problem, n)),
         }
     })
 }
@@ -75,17 +75,21 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
 /// without a bound rows in disorder would show themselves as noise.
 const POOR_METER: f64 = 5e-3;
 
+/// Noise that the plant file states for a channel; 0 if it states none.
+fn stated(problem: &Problem, n: usize) -> f64 {
+    let sensors = &problem.base.plant.sensors;
+    [&sensors.v_out, &sensors.i_l, &sensors.i_out, &sensors.v_in][n].noise
+}
+
 /// The most noise of a channel, of size `scale`.
 fn most(problem: &Problem, n: usize, scale: f64) -> f64 {
     let mut records = problem
         .records
         .iter()
         .filter(|r| r.measured[n].iter().any(|v| v.is_finite()));
-    let sensors = &problem.base.plant.sensors;
-    let stated = [&sensors.v_out, &sensors.i_l, &sensors.i_out, &sensors.v_in][n].noise;
     match records.all(|record| record.settled && !record.repeated) {
         // who states a larger noise has a poorer meter
-        true => (POOR_METER * scale).max(stated),
+        true => (POOR_METER * scale).max(stated(problem, n)),
         false => f64::INFINITY,
     }
 }
@@ -216,7 +220,7 @@ pub fn outliers(problem: &Problem, residual: &[f64]) -> Vec<Outlier> {
             let raw: Vec<f64> = record.measured[n].iter().map(|v| v / problem.sigma[n]).collect();
             for row in 2..record.rows().saturating_sub(2) {
                 // both: what leaps in the signal alone the model explains, what leaps in the residual alone it brings
-                if leaps(&left, row) && leaps(&raw, row) {
+                if leaps(&left, row) && (leaps(&raw, row) || leaps_off_curve(&raw, row)) {
                     found.push(Outlier {
                         record: index,
                         row,
@@ -229,6 +233,7 @@ pub fn outliers(problem: &Problem, residual: &[f64]) -> Vec<Outlier> {
     found
 }
 
+/// Whether a row lies apart from its neighbours, beyond their own spread.
 fn leaps(values: &[f64], row: usize) -> bool {
     let near = [values[row - 2], values[row - 1], values[row + 1], values[row + 2]];
     let (low, high) = near
@@ -236,6 +241,50 @@ fn leaps(values: &[f64], row: usize) -> bool {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     let apart = (values[row] - high).max(low - values[row]);
     near.iter().all(|v| v.is_finite()) && apart > FAR + (high - low)
+}
+
+/// A row lies off the curve through its neighbours this many times as far as rows near it do: a signal that swings bends everywhere.
+const OFF_CURVE: f64 = 4.0;
+
+/// Distance to the cubic curve through two neighbours on each side; nothing at an end or beside a hole.
+fn off_curve(values: &[f64], row: usize) -> Option<f64> {
+    let at = |by: isize| row.checked_add_signed(by).and_then(|row| values.get(row).copied());
+    let curve = (4.0 * (at(-1)? + at(1)?) - at(-2)? - at(2)?) / 6.0;
+    Some((values[row] - curve).abs()).filter(|off| off.is_finite())
+}
+
+/// Whether a row leaps out of a signal that swings, which hides a leap in the spread of its neighbours.
+fn leaps_off_curve(values: &[f64], row: usize) -> bool {
+    // the curves three and four rows further on do not go through this one
+    let near = [-4_isize, -3, 3, 4].map(|by| row.checked_add_signed(by).and_then(|row| off_curve(values, row)));
+    let known: Vec<f64> = near.into_iter().flatten().collect();
+    let usual = known.iter().copied().fold(0.0, f64::max);
+    // at a step one of the neighbours lies where the row lies
+    let [before, after] = [row - 1, row + 1].map(|other| values[row] - values[other]);
+    let is_single = |off: f64| before * after > 0.0 && before.abs().min(after.abs()) > 0.5 * off;
+    known.len() >= 3
+        && off_curve(values, row).is_some_and(|off| off > 2.0 * FAR && off > OFF_CURVE * usual && is_single(off))
+}
+
+/// Outliers that one sentence lists; a reader looks at no more.
+const LISTED: usize = 3;
+
+/// What is said of outliers.
+#[must_use]
+pub fn spikes(problem: &Problem, outliers: &[Outlier]) -> Option<String> {
+    let place = |one: &Outlier| {
+        let record = &problem.records[one.record];
+        format!(
+            "{} of {} at t = {:.6} s",
+            CHANNEL_NAMES[one.channel], record.name, record.time[one.row]
+        )
+    };
+    let listed: Vec<String> = outliers.iter().take(LISTED).map(place).collect();
+    let more = match outliers.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    (!outliers.is_empty()).then(|| format!("spikes of single rows are left out: {}{more}", listed.join(", ")))
 }
 
 /// How much more a sum over the records scatters than independent white noise would: noise that is the same in several
@@ -321,7 +370,7 @@ pub fn left(values: &[f64]) -> Left {
 
 #[cfg(test)]
 mod tests {
-    use super::scatter;
+    use super::{leaps_off_curve, scatter};
 
     /// Twelve uniform numbers of a linear congruential generator make a normal one.
     fn normal(state: &mut u64) -> f64 {
@@ -352,6 +401,26 @@ mod tests {
                 "step {step}: {mean} with {spread}"
             );
         }
+    }
+
+    #[test]
+    fn a_spike_on_a_swing_is_seen_and_a_step_or_a_swing_is_none() {
+        let mut state = 7;
+        let swing: Vec<f64> = (0..200)
+            .map(|n| 100.0 * (f64::from(n) * 0.3).sin() + normal(&mut state))
+            .collect();
+        let mut spiked = swing.clone();
+        spiked[93] += 60.0;
+        let step: Vec<f64> = (0..200)
+            .map(|n| if n < 77 { 0.0 } else { 80.0 } + normal(&mut state))
+            .collect();
+        let seen = |values: &[f64]| {
+            (2..198)
+                .filter(|row| leaps_off_curve(values, *row))
+                .collect::<Vec<usize>>()
+        };
+        assert_eq!(seen(&spiked), [93]);
+        assert!(seen(&swing).is_empty() && seen(&step).is_empty());
     }
 
     #[test]

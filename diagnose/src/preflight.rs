@@ -45,6 +45,10 @@ enum Reading {
     OtherSwitch,
     /// The record is of another kind of converter.
     Kind(Topology),
+    /// The source gave so many times the voltage of the plant file.
+    Source(f64),
+    /// The load drew so many times what was set.
+    Load(f64),
 }
 
 /// A record that is better read in another way.
@@ -64,6 +68,13 @@ impl Reading {
             Reading::Probe(n, times) => record.measured[n].iter_mut().for_each(|value| *value /= times),
             Reading::OtherSwitch => record.duty.iter_mut().for_each(|duty| *duty = 1.0 - *duty),
             Reading::Kind(_) => {}
+            Reading::Source(times) => record.v_in_ratio *= times,
+            Reading::Load(times) => {
+                for load in &mut record.load {
+                    (load.conductance, load.current, load.power) =
+                        (load.conductance * times, load.current * times, load.power * times);
+                }
+            }
             Reading::Shifted(by) => {
                 for values in &mut record.measured {
                     let old = std::mem::take(values);
@@ -76,7 +87,7 @@ impl Reading {
         record
     }
 
-    fn words(self, record: &Record) -> String {
+    fn words(self, record: &Record, model: &Model) -> String {
         let name = &record.name;
         match self {
             Reading::Shifted(by) => {
@@ -104,6 +115,16 @@ impl Reading {
                 "{name}: the duty looks like that of the lower switch, 1 - d; if so, turn it by a map file: scale = -1.0, offset = 1.0 for the duty \
                  under [columns]"
             ),
+            Reading::Source(times) => format!(
+                "{name}: looks like a source of about {}, {:+.0} % beside the plant file's: was the supply set so? then v_in under [converter] is to \
+                 be this; if not, v_out may be off by a gain",
+                crate::words::si(model.plant.converter.v_in * record.v_in_ratio * times, "V"),
+                100.0 * (times - 1.0)
+            ),
+            Reading::Load(times) => format!(
+                "{name}: looks as if the load drew {times:.3} times what is set: another resistor, another setting? then correct r_load, i_load or \
+                 p_load by a map; if not, the meter of the current may be off by a gain"
+            ),
             Reading::Kind(kind) => format!(
                 "{name}: the record looks like that of a {0}, and the model is of another kind; if so: topology = \"{0}\" under [converter] of the \
                  plant file",
@@ -115,7 +136,7 @@ impl Reading {
     /// Whether the list of causes has nothing that does the same to this record.
     fn is_no_cause(self, record: &Record) -> bool {
         match self {
-            Reading::Shifted(_) | Reading::Exchanged(..) => false,
+            Reading::Shifted(_) | Reading::Exchanged(..) | Reading::Source(_) | Reading::Load(_) => false,
             Reading::Probe(..) | Reading::Kind(_) => true,
             // a duty that stands still is another by 1 - 2 d, which a source voltage or an offset may be as well; one that moves goes the
             // other way
@@ -155,31 +176,60 @@ pub fn answer(problem: &Problem, misread: &[Misread]) -> Option<String> {
     (misread.len() == problem.records.len() && misread.iter().all(same)).then(|| first.words.clone())
 }
 
+/// Rows of a record in which readings are compared first: more only cost time where these tell.
+// some twenty readings of a record of thousands of rows take seconds
+const ENOUGH: usize = 1500;
+
+/// The first rows of a record.
+fn first_rows(record: &Record) -> Record {
+    let mut record = record.clone();
+    record.segments.retain(|segment| segment.start + 4 < ENOUGH);
+    for segment in &mut record.segments {
+        segment.end = segment.end.min(ENOUGH);
+    }
+    record.free_steps.retain(|row| *row < ENOUGH);
+    record.free_levels.retain(|level| level.rows.end <= ENOUGH);
+    record
+}
+
+/// Mean square that one record leaves in a reading.
+fn mean_square(problem: &Problem, null: &State, (index, record): (usize, &Record), reading: Option<Reading>) -> f64 {
+    let mut alone = problem.clone();
+    (alone.offsets, alone.masked) = (vec![0], vec![problem.masked[index].clone()]);
+    alone.records = vec![reading.map_or_else(|| record.clone(), |reading| reading.of(record))];
+    if let Some(Reading::Probe(n, times)) = reading {
+        // the noise was seen through the same probe
+        alone.sigma[n] /= times;
+    }
+    let model = reading.map_or_else(|| null.model.clone(), |reading| reading.model(&null.model));
+    let state = State::settle(&alone, &model, &alone.first_starts(), None);
+    state.chi2 / alone.count().max(1) as f64
+}
+
 fn best_reading(problem: &Problem, null: &State, index: usize) -> Option<Misread> {
-    let record = &problem.records[index];
-    let mean_square = |reading: Option<Reading>| {
-        let mut alone = problem.clone();
-        (alone.offsets, alone.masked) = (vec![0], vec![problem.masked[index].clone()]);
-        alone.records = vec![reading.map_or_else(|| record.clone(), |reading| reading.of(record))];
-        if let Some(Reading::Probe(n, times)) = reading {
-            // the noise was seen through the same probe
-            alone.sigma[n] /= times;
-        }
-        let model = reading.map_or_else(|| null.model.clone(), |reading| reading.model(&null.model));
-        let state = State::settle(&alone, &model, &alone.first_starts(), None);
-        state.chi2 / alone.count().max(1) as f64
-    };
-    let as_it_is = mean_square(None);
+    let whole = &problem.records[index];
+    let is_long = !whole.settled && whole.rows() > ENOUGH;
+    let mut record = if is_long { first_rows(whole) } else { whole.clone() };
+    let mut as_it_is = mean_square(problem, null, (index, &record), None);
+    if as_it_is < WRONG && is_long {
+        // what is wrong may begin later
+        record = whole.clone();
+        as_it_is = mean_square(problem, null, (index, whole), None);
+    }
     if as_it_is < WRONG {
         return None;
     }
     let tried = tried(problem, null, index).into_iter();
-    let found = tried.map(|reading| (mean_square(Some(reading)), reading));
-    let (left, reading) = found.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let found = tried.map(|reading| (mean_square(problem, null, (index, &record), Some(reading)), reading));
+    let (mut left, reading) = found.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let is_no_cause = reading.is_no_cause(whole);
+    if is_long && is_no_cause && left < WRONG {
+        left = left.max(mean_square(problem, null, (index, whole), Some(reading)));
+    }
     (left < LEFT * as_it_is).then(|| Misread {
-        words: reading.words(record),
+        words: reading.words(whole, &null.model),
         reading,
-        is_sure: left < WRONG && reading.is_no_cause(record),
+        is_sure: left < WRONG && is_no_cause,
     })
 }
 
@@ -203,6 +253,8 @@ fn tried(problem: &Problem, null: &State, index: usize) -> Vec<Reading> {
         );
     }
     list.push(Reading::OtherSwitch);
+    list.extend(other_source(record, &null.model).map(Reading::Source));
+    list.extend(other_load(record).map(Reading::Load));
     let own = null.model.plant.converter.topology;
     let kinds = [Topology::Buck, Topology::Boost, Topology::BuckBoost];
     list.extend(kinds.into_iter().filter(|kind| *kind != own).map(Reading::Kind));
@@ -225,6 +277,39 @@ fn is_nearer(problem: &Problem, null: &State, index: usize, (n, times): (usize, 
         });
     let (own, other) = errors.fold((0.0, 0.0), |(a, b), (own, other)| (a + own, b + other));
     other < own
+}
+
+/// How far a measured source voltage may lie from the one that the output shows: two meters of half a percent, and losses.
+const AGREES: f64 = 0.03;
+
+/// Supplies that are set wrong: one twice or half of what it should be is rather a probe of another ratio.
+const SUPPLIES: std::ops::Range<f64> = 0.55..1.8;
+
+/// The source voltage that a record shows over that of the plant file, if it is another; a measured one has to agree.
+fn other_source(record: &Record, model: &Model) -> Option<f64> {
+    let own = model.plant.converter.v_in * record.v_in_ratio;
+    let times = shown_source(record, model)? / own;
+    let measured = record.measured[3].iter().copied().filter(|v| v.is_finite());
+    let measured: Vec<f64> = measured.collect();
+    let agrees = measured.is_empty() || (median(measured) / own / times - 1.0).abs() < AGREES;
+    (agrees && SUPPLIES.contains(&times) && (times - 1.0).abs() > OTHER_SOURCE).then_some(times)
+}
+
+/// A drawn current over the set one from which on the load is another: meters and resistors are off by some percent together.
+const OTHER_LOAD: f64 = 0.06;
+
+/// The measured load current over the one that was set, if the load is another.
+fn other_load(record: &Record) -> Option<f64> {
+    let rows = (0..record.rows()).filter(|_| record.metered.is_none());
+    let times = median(rows.map(|row| {
+        let set = ideal::drawn(&record.load[row], record.measured[0][row]);
+        if set > 0.0 {
+            record.measured[2][row] / set
+        } else {
+            f64::NAN
+        }
+    }));
+    ((times - 1.0).abs() > OTHER_LOAD && times > 0.0).then_some(times)
 }
 
 /// Source voltage that a record's voltages and duties show, without the losses that all records share; nothing if the current may rest.

@@ -11,6 +11,7 @@ use crate::capture::terms::Drive;
 use crate::causes::{Bases, Knob};
 use crate::drive::{Begin, Model, Start, simulate};
 use crate::ideal::{self, Ideal};
+use crate::noise::Outlier;
 use crate::record::{CHANNELS, Record};
 use crate::slopes::load_steps;
 use crate::work::Work;
@@ -141,6 +142,13 @@ fn in_steps(record: &Record) -> [Vec<bool>; CHANNELS] {
 }
 
 impl Problem {
+    /// Leaves single rows out of every sum.
+    pub fn leave_out(&mut self, rows: &[Outlier]) {
+        for one in rows {
+            self.masked[one.record][one.channel][one.row] = true;
+        }
+    }
+
     /// Sets the problem up; noise and outliers are those of [`crate::noise`].
     #[must_use]
     pub fn new(mut records: Vec<Record>, base: Model) -> Self {

@@ -16,6 +16,8 @@ pub enum Progress<'a> {
         /// All of them.
         total: usize,
     },
+    /// What the records look like before any fit. It stands in the answer, too; the search behind it may take minutes.
+    Noticed(&'a str),
 }
 
 /// Hears how far it is, from any thread.
@@ -52,6 +54,7 @@ mod tests {
             match what {
                 Progress::Stage(stage) => heard.0.push(stage.to_owned()),
                 Progress::Done { done, total } => heard.1.push((done, total)),
+                Progress::Noticed(_) => {}
             }
         };
         assert_eq!(map(&say, "squares", &[1, 2, 3], |n| n * n), [1, 4, 9]);

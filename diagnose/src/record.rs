@@ -12,6 +12,7 @@ mod rows;
 mod source;
 mod stamp;
 mod steady;
+mod still;
 mod suspicion;
 mod together;
 mod unread;

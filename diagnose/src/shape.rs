@@ -1,6 +1,7 @@
 //! What a residual looks like that no cause explains.
 
 use crate::capture::left;
+use crate::fast;
 use crate::fit::State;
 use crate::ideal::{self, Ideal};
 use crate::level::ACCURACY;
@@ -86,24 +87,160 @@ pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64
 }
 
 fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &[f64], is_slow: bool) -> String {
+    let record = &problem.records[index];
     let total: f64 = values.iter().map(|v| v * v).sum();
+    let count = values.iter().filter(|v| **v != 0.0).count() as f64;
+    // what noise alone would not have left
+    let excess = (total - count).max(f64::MIN_POSITIVE);
     if let Some((row, share)) = burst(values, total) {
-        let t = problem.records[index].time[row];
-        return format!("a burst around t = {t:.4} s ({:.0} % of the power)", 100.0 * share);
-    }
-    let line = strongest_line(problem, &state.residual, n).filter(|line| line.share > LINE);
-    if let Some(line) = line {
+        let t = record.time[row];
+        let step = match is_stepped(record, row) {
+            true => ", where the duty or the load steps",
+            false => "",
+        };
         return format!(
-            "a line at {:.0} Hz of {:.3} ({:.0} % of the power)",
-            line.frequency,
-            line.amplitude,
-            100.0 * line.share
+            "a burst around t = {t:.4} s ({:.0} % of the power){step}",
+            100.0 * share
         );
     }
-    if !is_slow {
-        return "fast, without a line that stands out".to_owned();
+    let place = place(problem, record, values, excess);
+    if let Some(line) = strongest_line(problem, &state.residual, n).filter(|line| line.share > LINE) {
+        let of_line = 0.5 * count * (line.amplitude / problem.sigma[n]).powi(2) / excess;
+        let place = place.filter(|_| of_line < OF_EXCESS);
+        return format!(
+            "a line at {:.0} Hz of {:.3} ({:.0} % of the power){}",
+            line.frequency,
+            line.amplitude,
+            100.0 * line.share,
+            place.map_or(String::new(), |place| format!(", {place}"))
+        );
     }
-    followed(problem, (index, n), values)
+    match place {
+        Some(place) => place,
+        None if is_slow => followed(problem, (index, n), values),
+        None => "fast, without a line that stands out: a trembling from row to row".to_owned(),
+    }
+}
+
+/// Where what is left lies, if it lies at places in time or in a band.
+fn place(problem: &Problem, record: &Record, values: &[f64], excess: f64) -> Option<String> {
+    let trembles = || {
+        let share = trembling(problem, values, excess)?;
+        Some(format!(
+            "a trembling at about the frequency at which the filter swings ({:.0} % of what is not noise), without steps before it: edges that \
+             jitter or pulses that are lost kick it at random",
+            100.0 * share
+        ))
+    };
+    behind_steps(problem, record, values, excess)
+        .or_else(|| kicks(record, values, excess))
+        .or_else(trembles)
+}
+
+/// A line is all that is to be said if it holds this share of what noise does not: of two things the larger.
+const OF_EXCESS: f64 = 0.5;
+/// What is left lies behind the steps if the rows there hold this share of it, ...
+const BEHIND: f64 = 0.75;
+/// ... and so many times the share that they would hold if it lay everywhere.
+const MORE_THERE: f64 = 1.5;
+/// Periods of the filter behind a step in which it swings: e^-3 of a swing of usual damping is left.
+const SWINGS: f64 = 1.5;
+
+/// Whether duty or load change shortly before a row.
+fn is_stepped(record: &Record, row: usize) -> bool {
+    let from = row.saturating_sub(2 * BLOCK).max(1);
+    (from..(row + BLOCK).min(record.rows())).any(|row| !record.is_same_point(row, row - 1))
+}
+
+/// What is left behind steps of duty and load alone, and behind which of them.
+fn behind_steps(problem: &Problem, record: &Record, values: &[f64], excess: f64) -> Option<String> {
+    let p = &problem.base.plant.converter;
+    let swing = std::f64::consts::TAU * (p.inductance * p.capacitance).sqrt() / problem.bases.t_sw;
+    let many = (SWINGS * swing) as usize + 2;
+    let changes = |of: &dyn Fn(usize) -> bool| -> Vec<usize> { (1..record.rows()).filter(|row| of(*row)).collect() };
+    let duty = changes(&|row| record.duty[row] != record.duty[row - 1]);
+    let load = changes(&|row| record.load[row] != record.load[row - 1]);
+    let held = |steps: &[usize]| {
+        let mut near = vec![false; values.len()];
+        for step in steps {
+            let end = (step + many).min(near.len());
+            near[*step..end].fill(true);
+        }
+        let rows = values.iter().zip(&near).filter(|(v, near)| **v != 0.0 && **near);
+        let (sum, count) = rows.fold((0.0, 0.0), |(sum, count), (v, _)| (sum + v * v - 1.0, count + 1.0));
+        (sum / excess, count / values.len().max(1) as f64)
+    };
+    let is_there = |steps: &[usize]| {
+        let (share, rows) = held(steps);
+        !steps.is_empty() && share > BEHIND && share > MORE_THERE * rows
+    };
+    // the one that explains it alone says more than both
+    let which = match (is_there(&load), is_there(&duty)) {
+        (true, false) => "load",
+        (false, true) => "duty",
+        (true, true) if held(&load).1 <= held(&duty).1 => "load",
+        (true, true) => "duty",
+        (false, false) => {
+            let both = [duty.clone(), load.clone()].concat();
+            return is_there(&both)
+                .then(|| "a swing behind the steps of duty and load, gone where both stand still".to_owned());
+        }
+    };
+    Some(format!(
+        "a swing behind the steps of the {which}, gone where it stands still"
+    ))
+}
+
+/// Kicks are told from what lies everywhere if so small a share of the stretches ...
+const FEW: f64 = 0.25;
+/// ... holds this share of it.
+const OF_KICKS: f64 = 0.7;
+
+/// Single places, no step behind them, that hold most of what is left.
+fn kicks(record: &Record, values: &[f64], excess: f64) -> Option<String> {
+    let window = 2 * BLOCK;
+    let sums = values
+        .chunks(window)
+        .map(|chunk| chunk.iter().filter(|v| **v != 0.0).map(|v| v * v - 1.0).sum::<f64>());
+    let mut sums: Vec<(usize, f64)> = sums.enumerate().collect();
+    let most = (FEW * sums.len() as f64) as usize;
+    sums.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let held: f64 = sums.iter().take(most).map(|(_, sum)| sum).sum();
+    let (mut found, mut sum) = (Vec::new(), 0.0);
+    for (at, own) in &sums {
+        if sum > OF_KICKS * held {
+            break;
+        }
+        sum += own;
+        found.push(at * window);
+    }
+    found.sort_unstable();
+    let unstepped = found.iter().filter(|row| !is_stepped(record, **row + BLOCK)).count();
+    (most > 0 && held > OF_KICKS * excess && 2 * unstepped > found.len()).then(|| {
+        let places: Vec<String> = found.iter().take(3).map(|row| format!("{:.5} s", record.time[*row])).collect();
+        format!(
+            "kicks in {} places, first around t = {}, where neither duty nor load steps: lost or doubled pulses, or bursts from outside",
+            found.len(),
+            places.join(", ")
+        )
+    })
+}
+
+/// Share of the filter's frequency to either side that counts as about it.
+const ABOUT: f64 = 0.5;
+/// A trembling holds this share of what is left: more than half.
+const OF_TREMBLING: f64 = 0.6;
+
+/// The share of what is left that lies about the frequency of the filter, if that is most of it.
+fn trembling(problem: &Problem, values: &[f64], excess: f64) -> Option<f64> {
+    let p = &problem.base.plant.converter;
+    let own = problem.bases.t_sw / (std::f64::consts::TAU * (p.inductance * p.capacitance).sqrt());
+    let near = fast::band(values, own * (1.0 - ABOUT), own * (1.0 + ABOUT));
+    // white noise of this band, of power 1, is in it
+    let count = values.iter().filter(|v| **v != 0.0).count() as f64;
+    // the band is 2 ABOUT own of the half of the rate that there is
+    let share = (near - 4.0 * ABOUT * own * count).max(0.0) / excess;
+    (share > OF_TREMBLING && own * (values.len() as f64) > 4.0).then_some(share.min(1.0))
 }
 
 /// Correlation from which on one course follows another: a third of the one's square comes from the other.
@@ -130,18 +267,23 @@ fn followed(problem: &Problem, (index, n): (usize, usize), values: &[f64]) -> St
     let rests: Vec<f64> = (0..record.rows())
         .map(|row| f64::from(u8::from(is_at_rest(problem, record, row))))
         .collect();
-    let courses: [(&[f64], &str); 5] = [
+    let volts: Vec<f64> = record.measured[0]
+        .iter()
+        .map(|v| if v.is_finite() { *v } else { 0.0 })
+        .collect();
+    let courses: [(&[f64], &str); 6] = [
         (&rests, "slow, where the current rests in each period (DCM)"),
         (&load, "slow, following the load current"),
         (&record.duty, "slow, following the duty"),
         (&current, "slow, following the inductor current"),
+        (&volts, "slow, following the output voltage"),
         (&row, "a drift over the record"),
     ];
     let all = courses.map(|(course, words)| (of_means(values, course), words));
     let (at, step, share) = largest_step(values);
     let most = all.iter().map(|(r, _)| r * r).fold(share, f64::max);
     if most < ALIKE * ALIKE {
-        let [_, load, duty, _, time] = all.map(|(r, _)| r);
+        let [_, load, duty, _, _, time] = all.map(|(r, _)| r);
         return format!(
             "slow, following neither duty nor load nor time alone (correlations {duty:.2}, {load:.2}, {time:.2})"
         );

@@ -283,3 +283,75 @@ fn a_wrong_carrier_is_named() {
     assert_eq!(findings.verdict, diagnose::findings::Verdict::Explained);
     assert!(notes.contains("`carrier = \"centre\"` is taken"), "{notes}");
 }
+
+/// At a duty of 0.4 a buck-boost gives nearly what a buck gives at 1 - d: one number tells neither, and a duty that moves tells the
+/// direction.
+#[test]
+fn a_buck_boost_at_a_low_duty_is_no_turned_duty() {
+    let mut random = Noise(26);
+    for duty in [vec![(0, 0.4)], vec![(0, 0.38), (70, 0.42)]] {
+        let bench = Bench {
+            wiring: Wiring::BuckBoost,
+            rows: ROWS,
+            duty,
+            load: vec![(0.0, 0.0, 5.0)],
+            ..Bench::default()
+        };
+        let table = bench.run().with("i_load", vec![5.0; ROWS]);
+        let table = table.measured(
+            &[("v_out", 0.1, 0.02), ("i_l", 0.05, 5e-3), ("i_out", 0.05, 5e-3)],
+            &mut random,
+        );
+        let said = said(&table);
+        assert!(!said.contains("1 - d"), "{said}");
+    }
+}
+
+#[test]
+fn another_load_and_another_source_are_noted_before_the_search() {
+    let mut random = Noise(27);
+    let said_of =
+        |bench: &Bench, name: &str, times: f64, random: &mut Noise| said(&scaled(made(bench, random), name, times));
+    let set = said_of(&Bench::default(), "i_load", 1.0 / 1.3, &mut random);
+    assert!(set.contains("looks as if the load drew 1.3"), "{set}");
+    let low = Bench {
+        v_in: 170.0,
+        ..Bench::default()
+    };
+    let source = said_of(&low, "v_out", 1.0, &mut random);
+    assert!(source.contains("looks like a source of about 1"), "{source}");
+}
+
+/// Two thirds of the set load: with ripple and losses the current of the inductor looks like half of it, and no probe is wrong.
+#[test]
+fn a_load_that_both_meters_show_is_no_probe() {
+    let mut random = Noise(30);
+    let bench = Bench {
+        dcr: 1.0,
+        ..Bench::default()
+    };
+    let said = said(&scaled(made(&bench, &mut random), "i_load", 1.0 / 0.66));
+    assert!(!said.contains("i_l is 0.5 times"), "{said}");
+}
+
+#[test]
+fn spikes_are_left_out_on_a_swing_and_in_a_held_out_record() {
+    let mut random = Noise(28);
+    let train = read("train", &clean(&mut random));
+    let mut table = clean(&mut random);
+    for row in [40, 75, 131] {
+        table.column("i_l")[row] += 4.0;
+    }
+    let held = read("held", &table);
+    let found = diagnose::diagnosis::diagnose(&model(), vec![train], &[held], &|_| ());
+    let notes = found.findings.noise.repairs.join("\n");
+    assert!(
+        notes.contains("spikes of single rows are left out: i_l of held"),
+        "{notes}"
+    );
+    assert!(
+        found.findings.gain.shifts.is_empty(),
+        "{:?}",
+        found.findings.gain.shifts
+    );
+}

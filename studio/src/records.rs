@@ -54,6 +54,7 @@ pub(crate) fn diagnose(session: &Session, request: &Value, tell: Tell) -> Result
     let say = |what: Progress<'_>| match what {
         Progress::Stage(stage) => tell(stage),
         Progress::Done { done, total } => tell(&format!("{done} of {total}")),
+        Progress::Noticed(words) => tell(words),
     };
     let mut diagnosis = examined(&model, train, &heldout, &say);
     diagnosis.keep_text(&session.named(&wanted.model));

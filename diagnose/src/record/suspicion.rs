@@ -7,6 +7,7 @@ use super::Record;
 use super::channels::{CHANNEL_UNITS, CHANNELS, QUANTITIES};
 use super::source::Source;
 use super::steady::{self, Beside};
+use super::still;
 use crate::ideal::{self, Ideal};
 use crate::median::median;
 
@@ -29,6 +30,8 @@ const TURNED: f64 = 0.5;
 /// no cause of the list makes a signal 1.8 times as large.
 const PROBES: [f64; 4] = [2.0, 10.0, 0.5, 0.1];
 const AS_PROBE: f64 = 1.1;
+/// A load current that is off by more than this does not confirm what the load is: losses and two meters are less.
+const AGREES: f64 = 1.2;
 /// Share of the current that losses may take: of the voltage, that is, at the load. A diode of half a volt at 4 V makes a tenth.
 const CURRENT_LOST: f64 = 0.15;
 /// Share of its mean by which an inductor current has to lie outside of its ripple, at whichever instant it is sampled: losses of a
@@ -38,6 +41,14 @@ const APART: f64 = 0.2;
 const AS_OTHER: f64 = 0.05;
 /// ... and this far from what d makes. Losses, a tenth of the source at most, lie between.
 const NOT_AS_OWN: f64 = 0.2;
+/// Where the duty moves and the voltage falls with it, levels have only to agree with 1 - d within this: losses of a tenth of the source.
+const NEARLY_AS_OTHER: f64 = 0.12;
+/// Slope of the voltages over those of an ideal converter: losses that grow with the load, which may step with the duty, change it by some
+/// ten percent, and the wrong reading has the other sign.
+const STEEP: std::ops::Range<f64> = 0.6..1.5;
+/// Of two readings of one number the nearer is taken if it is this many times as near: a buck-boost's voltages at a duty of 0.4 are those
+/// of a buck at 0.6 but for a tenth.
+const CLEARLY: f64 = 3.0;
 /// A voltage is that of another kind of converter within this share: losses of a tenth.
 const AS_KIND: f64 = 0.1;
 
@@ -114,14 +125,29 @@ fn is_continuous(record: &Record, parameters: &Parameters) -> bool {
 /// A duty that is that of the lower switch.
 fn other_duty(record: &Record, parameters: &Parameters, header: &str) -> Vec<Message> {
     let ideal = Ideal::of(record, parameters);
-    let off = |duty: &dyn Fn(f64) -> f64| {
+    let off = |volts: &dyn Fn(f64) -> f64| {
         let each = record.measured[0].iter().zip(&record.duty);
         // as a share of the source, where a boost's voltages lie further apart than a buck's
-        median(each.map(|(v, d)| (v - ideal.volts(duty(*d))).abs() / ideal.v_in))
+        median(each.map(|(v, d)| (v - volts(*d)).abs() / ideal.v_in))
     };
-    let (own, other) = (off(&|d| d), off(&|d| 1.0 - d));
+    let (own, other) = (off(&|d| ideal.volts(d)), off(&|d| ideal.volts(1.0 - d)));
+    let kinds = [Topology::Buck, Topology::Boost, Topology::BuckBoost];
+    let of_kind = |of: &Topology| off(&|d| of.voltage(ideal.v_in, d));
+    let another = kinds.iter().filter(|of| **of != ideal.topology).map(of_kind);
+    let is_turned = match still::slopes(record, &ideal) {
+        // a voltage that falls where the duty rises is seen at any duty, at one half too
+        Some(slopes) => {
+            let falls = STEEP.contains(&slopes.other) && !STEEP.contains(&slopes.own);
+            falls && other < NEARLY_AS_OTHER && other < own + AS_OTHER
+        }
+        // one duty is one number, which another kind of converter makes as well
+        None => {
+            let least = another.fold(f64::INFINITY, f64::min);
+            own > NOT_AS_OWN && other < AS_OTHER && CLEARLY * other < least
+        }
+    };
     // the ripple is that of both
-    if !(own > NOT_AS_OWN && other < AS_OTHER && is_continuous(record, parameters)) {
+    if !(is_turned && is_continuous(record, parameters)) {
         return Vec::new();
     }
     let d = median(record.duty.iter().copied());
@@ -223,10 +249,16 @@ fn probes(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]
         ratio(own.times, *probe) < 1.0 + lost * (1.0 + ripple) || ratio(own.times_mean, *probe) < 1.0 + lost
     };
     let probe = PROBES.into_iter().find(is_probe);
-    // a current alone may be off because the load is
-    let confirmed = n == 3 || is_continuous(record, parameters) && known.len() > 1;
+    // a current alone may be off because the load is, and a voltage alone because the source is, but no source is ten times another
+    let is_alone = known.len() == 1 && !(n == 0 && probe.is_some_and(|probe| ratio(probe, 1.0) > 5.0));
+    let confirmed = n == 3 || is_continuous(record, parameters) && !is_alone;
     let is_current = n == 1 || n == 2;
-    let sure = confirmed && (!is_current || known.iter().any(|(other, _)| other + n == 3));
+    // the other current has to be as it should: where both are off, the load is another
+    let agrees = |(other, own): &(usize, Beside)| match other {
+        1 => own.apart <= APART,
+        _ => ratio(own.times, 1.0) < AGREES,
+    };
+    let sure = confirmed && (!is_current || known.iter().any(|one| one.0 + n == 3 && agrees(one)));
     let (Some(probe), true, false) = (probe, sure, sources[n].stated) else {
         return Vec::new();
     };

@@ -238,6 +238,10 @@ impl Shown {
                 self.line
                     .show(|| format!("{now:6.1} s  {stage}: {done} of {total}{}", left()));
             }
+            Progress::Noticed(words) => {
+                self.line.clear();
+                talk::tell(&format!("{:6.1} s  note: {words}", self.begun.elapsed().as_secs_f64()));
+            }
         }
     }
 }

@@ -7,7 +7,8 @@ use crate::independent::draft::{Case, Draft, Name};
 use crate::independent::draw::{Design, design};
 use crate::independent::families::{Options, consistent, measured, topology, words};
 use crate::independent::faults::{Fault, NONSENSE, TABLE_FAULTS, nonsense, spoil};
-use crate::independent::records::{Needs, programs};
+use crate::independent::records::{Extent, Needs, programs};
+use crate::independent::survey::{SEEN, SENSELESS, mean_square};
 use crate::independent::truth::{Expect, Hidden};
 use crate::rng::Rng;
 
@@ -50,6 +51,13 @@ pub fn bench(name: Name, id: &'static str, options: Options, random: &mut Rng) -
         }
         let mut draft = measured(&design, &design.world, Needs::default(), options, random)?;
         let fault = spoil(id, &design, &mut draft.tables, random)?;
+        // two currents with one mean, or rows without an edge between them, are as right as they were
+        if let Extent::Rows(_) = options.extent
+            && id != "one_minus_d"
+            && mean_square(&draft) < SEEN
+        {
+            return None;
+        }
         let hidden = hidden(fault.id, fault.what.clone());
         return Some(draft.case(name, hidden, expected(&fault), &[], false, random));
     }
@@ -192,6 +200,12 @@ pub fn nonsense_case(name: Name, id: &'static str, options: Options, random: &mu
     let design = design(topology(options, random), random);
     let mut draft = measured(&design, &design.world, Needs::default(), options, random)?;
     let what = nonsense(id, &design, &mut draft.tables, random);
+    // rows of one duty in another order are the same rows
+    if let Extent::Rows(_) = options.extent
+        && mean_square(&draft) < SENSELESS * SENSELESS
+    {
+        return None;
+    }
     let expect = Expect {
         refusal: true,
         ..consistent()

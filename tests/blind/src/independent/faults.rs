@@ -137,16 +137,18 @@ fn spoil_rows(
     match id {
         "shifted" => {
             let rows = 1 + random.below(4);
+            let early = random.chance(0.5);
             for table in tables.iter_mut() {
                 for values in table.values.iter_mut().filter(|values| !values.is_empty()) {
-                    values.rotate_right(rows);
-                    let first = values[rows];
-                    values[..rows].fill(first);
+                    shift(values, rows, early);
                 }
             }
             let words: [&[&str]; 4] = [&["shift"], &["row", "late"], &["row", "early"], &["rows later"]];
-            let mut fault = fault(id, format!("measured columns {rows} rows late"), &words);
-            fault.causes = if rows <= 2 {
+            let way = if early { "early" } else { "late" };
+            let mut fault = fault(id, format!("measured columns {rows} rows {way}"), &words);
+            fault.causes = if early {
+                vec![]
+            } else if rows <= 2 {
                 vec!["duty_delay", "sampling_delay", "sensor_delay"]
             } else {
                 vec!["duty_delay"]
@@ -198,8 +200,26 @@ fn spoil_rows(
     }
 }
 
+/// Moves a column by rows, as a trigger or a buffer of the logger does; what is not known repeats the value next to it.
+fn shift(values: &mut [f64], rows: usize, early: bool) {
+    let count = values.len();
+    if early {
+        values.rotate_left(rows);
+        let last = values[count - rows - 1];
+        values[count - rows..].fill(last);
+    } else {
+        values.rotate_right(rows);
+        let first = values[rows];
+        values[..rows].fill(first);
+    }
+}
+
 fn lose(table: &mut Table, times: usize, random: &mut Rng) {
     for _ in 0..times {
+        // a short record keeps some rows
+        if table.rows() < 40 {
+            return;
+        }
         let (from, many) = (5 + random.below(table.rows() - 20), 1 + random.below(4));
         table.t.drain(from..from + many);
         table.duty.drain(from..from + many);

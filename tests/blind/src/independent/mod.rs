@@ -30,11 +30,14 @@ mod program;
 mod records;
 mod set;
 mod simulate;
+mod survey;
 mod tally;
 mod ties;
 mod truth;
 
+pub use draft::Case;
 pub use judge::{Answer, Judgement, Outcome, judge};
 pub use set::{Set, make};
+pub use survey::{Group, Surveyed, surveyed};
 pub use tally::{json, markdown};
 pub use truth::{Expect, Family, Hidden, Reducible, Tie, Truth};

@@ -23,16 +23,34 @@ pub enum Extent {
     Full,
     /// For tests.
     Short,
+    /// So many rows in each training record: settled points where they are few.
+    Rows(usize),
 }
+
+/// Fewer rows than these are a table of settled points: a record over time of fewer shows next to nothing.
+pub const FEWEST_IN_TIME: usize = 40;
+/// Most rows of a record that only judges, and of one that does not learn alone, in a set of drawn lengths.
+const MOST_JUDGED: usize = 150;
 
 /// Draws the records of a case: two or three to learn from, one or two that judge.
 pub fn programs(design: &Design, needs: Needs, extent: Extent, random: &mut Rng) -> Vec<Program> {
-    if !needs.rows && random.chance(0.2) {
-        return tables(design, needs, random);
+    match extent {
+        Extent::Rows(rows) if !needs.rows && rows < FEWEST_IN_TIME => {
+            return tables(design, needs, rows, random);
+        }
+        Extent::Full | Extent::Short if !needs.rows && random.chance(0.2) => {
+            let points = 14 + random.below(20);
+            return tables(design, needs, points, random);
+        }
+        _ => {}
     }
     let kinds = kinds(needs, random);
     let heldout = 1;
-    let train = if extent == Extent::Short { 1 } else { 2 };
+    let train = match extent {
+        Extent::Short => 1,
+        Extent::Rows(rows) if rows > MOST_JUDGED => 1,
+        _ => 2,
+    };
     let mut all = Vec::new();
     for number in 0..train + heldout {
         let judged = number >= train;
@@ -40,6 +58,8 @@ pub fn programs(design: &Design, needs: Needs, extent: Extent, random: &mut Rng)
         let rows = match extent {
             Extent::Full => 110 + 10 * random.below(8),
             Extent::Short => 80,
+            Extent::Rows(rows) if judged => rows.clamp(FEWEST_IN_TIME, MOST_JUDGED),
+            Extent::Rows(rows) => rows.max(FEWEST_IN_TIME),
         };
         let name = format!("{}{number:02}", ["run_", "rec", "m", "log-"][random.below(4)]);
         all.push(record(design, kind, (name, judged, rows), random));
@@ -64,6 +84,8 @@ fn kinds(needs: Needs, random: &mut Rng) -> Vec<Kind> {
 fn record(design: &Design, kind: Kind, (name, heldout, rows): (String, bool, usize), random: &mut Rng) -> Program {
     let lead = 4;
     let hold = ((design.swing * random.uniform(0.8, 1.5)) as usize).clamp(15, 45);
+    // nobody steps a long record a hundred times
+    let hold = hold * (rows / 200).max(1);
     let what = random.below(4);
     let span = match design.world.board.topology {
         Topology::Buck => 0.25,
@@ -113,15 +135,11 @@ fn round_duty(duty: f64) -> f64 {
 }
 
 /// Settled points over duty and load.
-fn tables(design: &Design, needs: Needs, random: &mut Rng) -> Vec<Program> {
+fn tables(design: &Design, needs: Needs, most: usize, random: &mut Rng) -> Vec<Program> {
     let kinds = kinds(needs, random);
     (0..2)
         .map(|number| {
-            let points = if number == 0 {
-                14 + random.below(20)
-            } else {
-                8 + random.below(8)
-            };
+            let points = if number == 0 { most } else { 8 + random.below(8) };
             let periods = (0..points)
                 .map(|_| {
                     let duty = level(

@@ -1,0 +1,127 @@
+//! How a record's voltage goes with its duty where both stand still: the direction that levels alone do not tell.
+
+use super::Record;
+use crate::ideal::Ideal;
+
+/// Rows that a duty and a load stand still before the voltage is read, in periods of the filter: e^-3 of a swing of usual damping is left.
+const RESTED: f64 = 1.0;
+/// Rows of which the mean is taken at the end of a stretch, at least: fewer lie on a swing.
+const FEWEST: usize = 5;
+/// Duties nearer to each other than this are one: noise and losses tilt a line through them. A convention.
+const MOVES: f64 = 0.03;
+
+/// Slopes of the voltage over what an ideal converter gives; 1 for one without losses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slopes {
+    /// With the duty as it is.
+    pub own: f64,
+    /// With that of the other switch.
+    pub other: f64,
+}
+
+/// The slopes of a record; nothing if its duty hardly moves, or it never stands still.
+pub fn slopes(record: &Record, ideal: &Ideal) -> Option<Slopes> {
+    let points = points(record, ideal);
+    let (low, high) = points
+        .iter()
+        .fold((1.0f64, 0.0f64), |(low, high), (d, _)| (low.min(*d), high.max(*d)));
+    if high - low < MOVES {
+        return None;
+    }
+    let over = |volts: &dyn Fn(f64) -> f64| {
+        let count = points.len() as f64;
+        let (x_mean, v_mean) = points.iter().fold((0.0, 0.0), |(x, v), (d, volt)| {
+            (x + volts(*d) / count, v + volt / count)
+        });
+        let (cross, own) = points.iter().fold((0.0, 0.0), |(cross, own), (d, v)| {
+            let x = volts(*d) - x_mean;
+            (cross + x * (v - v_mean), own + x * x)
+        });
+        cross / own
+    };
+    let slopes = Slopes {
+        own: over(&|d| ideal.volts(d)),
+        other: over(&|d| ideal.volts(1.0 - d)),
+    };
+    (slopes.own.is_finite() && slopes.other.is_finite()).then_some(slopes)
+}
+
+/// Duty and voltage of settled points, and of the ends of stretches in which duty and load stand still.
+fn points(record: &Record, ideal: &Ideal) -> Vec<(f64, f64)> {
+    let volts = &record.measured[0];
+    if record.settled {
+        return record
+            .duty
+            .iter()
+            .copied()
+            .zip(volts.iter().copied())
+            .filter(|(_, v)| v.is_finite())
+            .collect();
+    }
+    let rested = (RESTED * ideal.swing()) as usize;
+    let mut points = Vec::new();
+    let mut start = 0;
+    for row in 1..=record.rows() {
+        if row < record.rows() && record.is_same_point(row, start) {
+            continue;
+        }
+        let tail: Vec<f64> = volts[(start + rested).min(row)..row]
+            .iter()
+            .copied()
+            .filter(|v| v.is_finite())
+            .collect();
+        if tail.len() >= FEWEST {
+            points.push((record.duty[start], tail.iter().sum::<f64>() / tail.len() as f64));
+        }
+        start = row;
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plant::{Load, Parameters};
+
+    fn record(volts: impl Fn(f64) -> f64) -> Record {
+        let parameters = Parameters::paper_table();
+        let duty: Vec<f64> = (0..400).map(|row| 0.4 + 0.05 * f64::from(row / 100)).collect();
+        let text: String = (duty.iter().enumerate())
+            .map(|(row, d)| format!("{},{d},{},20\n", row as f64 * 1e-4, volts(*d)))
+            .collect();
+        let sheet = measured::Sheet::parse(
+            std::path::Path::new("run.csv"),
+            format!("t,duty,v_out,r_load\n{text}").into(),
+            &Record::file_options(),
+        );
+        let map = measured::ColumnMap::parse("duty=duty*1").unwrap();
+        let record = Record::read(&sheet.unwrap(), &map, &parameters).unwrap();
+        assert_eq!(
+            record.load[0],
+            Load {
+                conductance: 0.05,
+                ..Load::default()
+            }
+        );
+        record
+    }
+
+    #[test]
+    fn a_voltage_that_falls_with_the_duty_has_the_other_slope() {
+        let ideal = Ideal::at(&Parameters::paper_table(), 1.0);
+        let rises = slopes(&record(|d| 0.96 * ideal.volts(d) - 1.0), &ideal).unwrap();
+        let falls = slopes(&record(|d| 0.96 * ideal.volts(1.0 - d) - 1.0), &ideal).unwrap();
+        assert!(
+            (rises.own - 0.96).abs() < 1e-3 && (rises.other + 0.96).abs() < 1e-3,
+            "{rises:?}"
+        );
+        assert!(
+            (falls.own + 0.96).abs() < 1e-3 && (falls.other - 0.96).abs() < 1e-3,
+            "{falls:?}"
+        );
+        assert_eq!(
+            slopes(&record(|_| 50.0), &ideal).map(|slopes| slopes.own.abs() < 1e-9),
+            Some(true)
+        );
+    }
+}

@@ -143,11 +143,11 @@ pub fn explained_without(
 
 /// The one channel in which causes that leave no structure do not hold in held-out records: what disturbs it did not show before.
 fn spoilt_later(whole: &Examined) -> Option<Part> {
-    let of = |doubt| match doubt {
-        &Doubt::HeldOut(ref channels, _) => channels.as_slice(),
-        _ => &[],
+    let of = |doubt: &Doubt| match doubt {
+        Doubt::HeldOut(channels, _) => channels.clone(),
+        _ => Vec::new(),
     };
-    let mut channels = whole.doubts.iter().flat_map(of).copied();
+    let mut channels = whole.doubts.iter().flat_map(of);
     let first = channels.next()?;
     (channels.all(|other| other == first) && may_miss(&whole.problem, first)).then_some(Part::Channel(first))
 }

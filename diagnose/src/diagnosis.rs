@@ -74,18 +74,12 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let sources = preflight::sources(&found.problem.records, heldout, &found.problem.base);
     say(Progress::Stage("held-out records"));
     let mut pair = found.judged(heldout, &base);
-    let mut aside = None;
     // with the carrier that was found
     let taken = found.problem.base.clone();
-    match aside::explained_without(&kept, &found, heldout, &taken, say) {
-        Some(rest) if rest.found.named.is_empty() => found.odd.push(rest.part.alone(&found.problem)),
-        Some(mut rest) => {
-            rest.found.read_before(&found);
-            let whole = std::mem::replace(&mut found, rest.found);
-            (pair, aside) = (rest.pair, Some((rest.part, whole.problem)));
-        }
-        None => {}
-    }
+    let aside = match aside::explained_without(&kept, &found, heldout, &taken, say) {
+        Some(rest) => put_aside(rest, &mut found, &mut pair),
+        None => None,
+    };
     let explained = found.verdict != Verdict::Unexplained;
     let (state, trim) = better(&found, model.converter.f_sw);
     let mut answer = answer(&found, pair.as_ref(), &state, sources, say);
@@ -110,13 +104,8 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     }
     let given = as_given(&found.problem, &base, &mut answer.partial_gain, pair.as_ref());
     let compared = compared::of(&found.problem, &kept, heldout);
-    let notes = answer
-        .notes
-        .into_iter()
-        .chain(unused)
-        .chain(standing.clone())
-        .chain(work.said());
-    eprintln!("WORK {:?}", work);
+    let more = standing.clone().into_iter().chain(work.said());
+    let notes = answer.notes.into_iter().chain(unused).chain(more);
     let findings = Findings {
         sentence: sentence(&found, &answer.causes, set_aside.as_ref())
             + &answer.near
@@ -155,6 +144,19 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         control: None,
         retrained: None,
     }
+}
+
+/// Makes an explanation of all but a part the answer; the part, and the problem with it. Where the model as given explains the rest,
+/// that is a note.
+fn put_aside(mut rest: aside::Rest, found: &mut Examined, pair: &mut Option<Pair>) -> Option<(aside::Part, Problem)> {
+    if rest.found.named.is_empty() {
+        found.odd.push(rest.part.alone(&found.problem));
+        return None;
+    }
+    rest.found.read_before(found);
+    let whole = std::mem::replace(found, rest.found);
+    *pair = rest.pair;
+    Some((rest.part, whole.problem))
 }
 
 /// The better model that was found, and its trim; the model as given where causes do not explain the records.

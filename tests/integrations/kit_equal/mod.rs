@@ -222,8 +222,8 @@ fn at_the_start(edited: &Edited) -> bool {
 
 fn behind_the_tables(edited: &Edited) -> bool {
     // the last call of its kind in the slice
-    let calls = edited.body().iter().filter(|line| line.contains("_crc(&span, "));
-    let is_last = calls.last().is_some_and(|line| line.trim() == edited.line());
+    let mut calls = edited.body().iter().filter(|line| line.contains("_crc(&span, "));
+    let is_last = calls.next_back().is_some_and(|line| line.trim() == edited.line());
     is_last && edited.within("integrity_slice") && bits(&edited.edit.new) > bits(&edited.edit.old)
 }
 

@@ -33,7 +33,10 @@ impl Work {
             false => 1,
         };
         let of_record = if record.settled { SETTLED } else { 1 };
-        let rows = record.rows() as u64 * of_plant * of_record;
+        self.count(record.rows() as u64 * of_plant * of_record);
+    }
+
+    fn count(&self, rows: u64) {
         self.0.rows.fetch_add(rows, Ordering::Relaxed);
     }
 
@@ -56,5 +59,23 @@ impl Work {
                 ROWS / 1_000_000
             )
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ROWS, Work};
+
+    #[test]
+    fn work_ends_at_its_budget_for_all_who_share_it_and_only_what_was_not_begun_is_said() {
+        let work = Work::default();
+        let shared = work.clone();
+        shared.count(ROWS - 1);
+        assert!(work.goes_on());
+        shared.count(1);
+        // nobody has asked for more
+        assert_eq!(work.said(), None);
+        assert!(!work.goes_on());
+        assert!(shared.said().is_some_and(|said| said.contains("24 million")));
     }
 }

@@ -131,21 +131,29 @@ impl Budget {
             [] => "",
             _ => ", and compute_delay = 1 in the contract",
         };
-        (self.fit != Fit::Missed && most > HALF).then(|| {
-            let acts = match most < 1.0 {
-                true => format!(
-                    "Sampled within the first {:.0} % of the PWM period, its duty acts from the next start on; later, it can miss that",
-                    100.0 * (1.0 - most)
-                ),
-                false => "Wherever in the PWM period it is sampled, its duty can miss the next start".to_owned(),
-            };
-            format!(
-                "  note: a step takes up to {:.0} % of the period. {acts} and act one period later. A training that sampled at the start \
-                 had a duty that acts at that start, which no timer gives. Train with pwm.duty_delay = 1 in the plant file in both \
-                 cases{and_there}",
+        (self.fit != Fit::Missed && most > HALF).then(|| match most < 1.0 {
+            true => format!(
+                "  note: a step takes up to {:.0} % of the period. Sampled within the first {:.0} % of it, the duty acts from the next start on; \
+                 later, it can miss that and act one period later: train with pwm.duty_delay = 1 in the plant file then{and_there}. So does a \
+                 training that sampled at the start and whose duty acted at once, which no timer does",
+                100.0 * most,
+                100.0 * (1.0 - most)
+            ),
+            false => format!(
+                "  note: a step takes up to {:.0} % of the period, and one that takes more than 100 % is late in every period, which no training \
+                 mends. Below that its duty still acts one period later: train with pwm.duty_delay = 1 in the plant file{and_there}",
                 100.0 * most
-            )
+            ),
         })
+    }
+
+    /// What becomes of half of the period, which is all that a policy has that samples in the middle.
+    fn half(&self) -> &'static str {
+        match self.share {
+            (_, most) if most <= HALF => "and so is half of it",
+            (least, _) if least <= HALF => "half of it in doubt",
+            _ => "half of it NOT",
+        }
     }
 
     /// One line for the build of this name.
@@ -159,7 +167,8 @@ impl Budget {
                 "met, with nothing left for interrupt entry and drivers at the worst".to_owned()
             }
             Fit::Met => format!(
-                "met; {:.0} % of the period is left for everything else at the worst",
+                "met, {}; {:.0} % of the period is left for everything else at the worst",
+                self.half(),
                 100.0 - most
             ),
             Fit::Doubtful => "in doubt: the model's fewest cycles fit, its most do not".to_owned(),
@@ -231,12 +240,12 @@ mod tests {
         assert!(
             lateness((2_000, 6_200))
                 .unwrap()
-                .contains("within the first 38 % of the PWM period")
+                .contains("within the first 38 % of it")
         );
         assert!(
             lateness((5_000, 10_001))
                 .unwrap()
-                .contains("Wherever in the PWM period")
+                .contains("late in every period, which no training")
         );
         // what does not fit at all is another matter
         assert_eq!(lateness((10_001, 20_000)), None);
@@ -247,6 +256,8 @@ mod tests {
                 .text("gcc")
         };
         assert!(text((5_000, 9_950)).contains("nothing left"));
-        assert!(text((5_000, 9_800)).contains("2 % of the period is left"));
+        assert!(text((5_000, 9_800)).contains("met, half of it in doubt; 2 % of the period is left"));
+        assert!(text((5_100, 9_800)).contains("met, half of it NOT; 2 % of the period is left"));
+        assert!(text((2_000, 5_000)).contains("met, and so is half of it; 50 % of the period is left"));
     }
 }

@@ -53,7 +53,8 @@ pub struct Manifest {
     /// Outputs beside the cores, by name. The key is older than the word *integration*; folders that users keep have it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub doors: Vec<&'static str>,
-    /// Control steps in the back-to-back kit, if there is one.
+    /// Control steps that were asked of the back-to-back kit, if there is one: from this number the same kit is made again. It may
+    /// have more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kit_steps: Option<u32>,
     /// Numeric format.
@@ -166,7 +167,7 @@ pub fn manifest(
             .collect(),
         kit_steps: expected
             .filter(|_| outputs.contains(&Output::Kit))
-            .map(|expected| expected.policy.steps()),
+            .map(|expected| expected.asked),
         numeric_format: policy.numeric_format,
         sample_period: policy.sample_period,
         digests: policy.digests.clone(),

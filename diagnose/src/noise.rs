@@ -261,7 +261,11 @@ fn leaps_off_curve(values: &[f64], row: usize) -> bool {
     let usual = known.iter().copied().fold(0.0, f64::max);
     // at a step one of the neighbours lies where the row lies
     let [before, after] = [row - 1, row + 1].map(|other| values[row] - values[other]);
-    let is_single = |off: f64| before * after > 0.0 && before.abs().min(after.abs()) > 0.5 * off;
+    // the curves of its neighbours go through a leap, and lie off by two thirds of it
+    let beside = [row - 1, row + 1].map(|other| off_curve(values, other).unwrap_or(0.0));
+    let is_single = |off: f64| {
+        before * after > 0.0 && before.abs().min(after.abs()) > 0.5 * off && beside.iter().all(|other| *other < off)
+    };
     known.len() >= 3
         && off_curve(values, row).is_some_and(|off| off > 2.0 * FAR && off > OFF_CURVE * usual && is_single(off))
 }

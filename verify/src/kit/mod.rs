@@ -85,6 +85,7 @@ pub fn material(policy: &Policy, target: &TargetSpec, steps: u32) -> Result<Mate
     Ok(Material {
         policy: trace(policy, steps, Moves::All)?,
         suite: suite.into_iter().collect::<Result<_, _>>()?,
+        asked: steps,
     })
 }
 

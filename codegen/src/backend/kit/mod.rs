@@ -30,6 +30,8 @@ pub struct Material {
     pub policy: Trace,
     /// The construct suite: lowered controllers with their moves.
     pub suite: Vec<(Program, Trace)>,
+    /// Control steps that were asked for; `policy` may have more.
+    pub asked: u32,
 }
 
 /// `<name>_kit.c`; it is built together with `<name>.c`.

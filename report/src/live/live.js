@@ -38,7 +38,8 @@
   const roomFor = (plot, axis, low, high) => {
     const decimals = Math.max(0, Math.ceil(1 - Math.log10(high - low || 1)));
     const longest = Math.max(low.toFixed(Math.min(decimals, 9)).length, high.toFixed(Math.min(decimals, 9)).length);
-    return Math.max(50, 7 * longest + 16);
+    // two more: steps of 2.5 have a digit more, and a sign
+    return Math.max(50, 7 * (longest + 2) + 16);
   };
 
   // lowest and highest value within a stretch of x; nothing where there is none

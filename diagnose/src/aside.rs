@@ -19,7 +19,7 @@ use crate::fit::State;
 use crate::gain::{self, Pair};
 use crate::noise;
 use crate::problem::{Problem, dot};
-use crate::progress::Listener;
+use crate::progress::{Listener, Progress};
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 use crate::shape::structures;
 use crate::worth;
@@ -119,6 +119,12 @@ pub fn explained_without(
         false => parts(whole),
     };
     let work = &whole.problem.work;
+    // what the records look like has been said of all of them
+    let say: Listener<'_> = &|what| {
+        if !matches!(what, Progress::Noticed(_)) {
+            say(what);
+        }
+    };
     looks.into_iter().take(LOOKS).find_map(|part| {
         if !work.goes_on() {
             return None;

@@ -14,6 +14,7 @@ use crate::doubts;
 use crate::drive::Model;
 use crate::empirical::{self, Described};
 use crate::examine::{Examined, examined, held};
+use crate::extend;
 use crate::findings::{Findings, Gain, Hidden, Named, Noise, Verdict};
 use crate::fit::State;
 use crate::gain::{Pair, Shift};
@@ -165,15 +166,14 @@ fn better(found: &Examined, f_sw: f64) -> (State, f64) {
         Verdict::Unexplained => (found.attribution.null.clone(), 0.0),
         _ => {
             let state = found.attribution.state().clone();
-            let trim = state.starts.trim_or_none(f_sw);
-            (
-                state,
-                if is_resolved(&found.attribution, trim) && is_shown(&found.problem, trim) {
-                    trim
-                } else {
-                    0.0
-                },
-            )
+            // as the file has it: the figures are those of that file
+            let trim = extend::told(state.starts.trim_or_none(f_sw), f_sw);
+            let trim = if is_resolved(&found.attribution, trim) {
+                trim
+            } else {
+                0.0
+            };
+            (state, trim)
         }
     }
 }
@@ -182,19 +182,6 @@ fn better(found: &Examined, f_sw: f64) -> (State, f64) {
 fn is_resolved(attribution: &Attribution, trim: f64) -> bool {
     let sd = attribution.basis.trim_sd().unwrap_or(f64::INFINITY);
     trim.abs() > 2.0 * sd * attribution.inflation.sqrt()
-}
-
-/// The channel of the output voltage.
-const OUTPUT_VOLTAGE: usize = 0;
-/// A trim that moves the output voltage by less than this share of the noise of a row is not written into a model.
-// in squares it adds 2 % to the noise, which is the last digit of a figure; a file that has it reads as if the gate were a finding
-const SHOWN: f64 = 0.2;
-
-/// Whether a trim of the edges is more than a line in a file.
-fn is_shown(problem: &Problem, trim: f64) -> bool {
-    let (noise, converter) = (problem.sigma[OUTPUT_VOLTAGE], &problem.base.plant.converter);
-    let node = converter.topology.span(converter.v_in, problem.bases.v);
-    !noise.is_finite() || trim.abs() * node > SHOWN * noise
 }
 
 /// The records that judge, and what is said of captures among them.

@@ -21,7 +21,8 @@ const NO_TRIM: f64 = 0.01;
 /// Where the trim is written.
 const EDGES: [&str; 2] = ["switch.turn_on_delay", "switch.turn_off_delay"];
 
-fn told(trim: f64, f_sw: f64) -> f64 {
+/// The trim as it is told, 1: 0 where it is less than any edge does; `f_sw` in Hz.
+pub fn told(trim: f64, f_sw: f64) -> f64 {
     if trim.abs() < NO_TRIM * duty_accuracy(f_sw) {
         0.0
     } else {

@@ -154,9 +154,7 @@ fn is_stepped(record: &Record, row: usize) -> bool {
 
 /// What is left behind steps of duty and load alone, and behind which of them.
 fn behind_steps(problem: &Problem, record: &Record, values: &[f64], excess: f64) -> Option<String> {
-    let p = &problem.base.plant.converter;
-    let swing = std::f64::consts::TAU * (p.inductance * p.capacitance).sqrt() / problem.bases.t_sw;
-    let many = (SWINGS * swing) as usize + 2;
+    let many = (SWINGS * Ideal::at(&problem.base.plant, 1.0).swing()) as usize + 2;
     let changes = |of: &dyn Fn(usize) -> bool| -> Vec<usize> { (1..record.rows()).filter(|row| of(*row)).collect() };
     let duty = changes(&|row| record.duty[row] != record.duty[row - 1]);
     let load = changes(&|row| record.load[row] != record.load[row - 1]);
@@ -233,8 +231,7 @@ const OF_TREMBLING: f64 = 0.6;
 
 /// The share of what is left that lies about the frequency of the filter, if that is most of it.
 fn trembling(problem: &Problem, values: &[f64], excess: f64) -> Option<f64> {
-    let p = &problem.base.plant.converter;
-    let own = problem.bases.t_sw / (std::f64::consts::TAU * (p.inductance * p.capacitance).sqrt());
+    let own = Ideal::at(&problem.base.plant, 1.0).swing().recip();
     let near = fast::band(values, own * (1.0 - ABOUT), own * (1.0 + ABOUT));
     // white noise of this band, of power 1, is in it
     let count = values.iter().filter(|v| **v != 0.0).count() as f64;

@@ -134,12 +134,7 @@ fn a_defect_in_an_output_that_is_not_the_first_fails() {
             "state->previous_command_mid = 0.50000006f",
         ),
     ];
-    for (ran, (from, to)) in edited(&policy, &edits).into_iter().zip(edits) {
-        assert!(
-            ran.code == Some(1) && ran.stdout.contains("FAIL"),
-            "{from} => {to}: {ran:?}"
-        );
-    }
+    all_fail(&policy, &edits);
 }
 
 /// Where the flash is small the parts run one after the other, and together they make the checks of the whole; the first two need
@@ -190,6 +185,16 @@ fn edited(policy: &Policy, edits: &[(&str, &str)]) -> Vec<Ran> {
         run_program(None, folder.path())
     };
     edits.iter().map(run_one).collect()
+}
+
+/// Each edit alone makes the kit fail.
+fn all_fail(policy: &Policy, edits: &[(&str, &str)]) {
+    for (ran, (from, to)) in edited(policy, edits).into_iter().zip(edits) {
+        assert!(
+            ran.code == Some(1) && ran.stdout.contains("FAIL"),
+            "{from} => {to}: {ran:?}"
+        );
+    }
 }
 
 pub fn first_literal(text: &str, table: &str) -> String {
@@ -253,9 +258,7 @@ fn an_edited_constant_of_mapping_limits_or_status_fails() {
             "state->held[0] = front->signal[0];",
         ),
     ];
-    for (ran, (from, _)) in edited(&policy, &edits).into_iter().zip(edits) {
-        assert!(ran.code == Some(1) && ran.stdout.contains("FAIL"), "{from}: {ran:?}");
-    }
+    all_fail(&policy, &edits);
 }
 
 /// What a random run of some hundred steps meets seldom or never: limits far from the actions, the last bridged sample, the
@@ -302,12 +305,7 @@ fn an_edit_where_random_moves_seldom_come_fails() {
         ("(span.crc ^ 0xFFFFFFFFu) == 0x", "(span.crc ^ 0xFFFFFFFFu) >= 0x"),
         ("(span.crc ^ 0xFFFFFFFFu) == 0x", "(span.crc ^ 0xFFFFFFFFu) <= 0x"),
     ];
-    for (ran, (from, to)) in edited(&policy, &edits).into_iter().zip(edits) {
-        assert!(
-            ran.code == Some(1) && ran.stdout.contains("FAIL"),
-            "{from} => {to}: {ran:?}"
-        );
-    }
+    all_fail(&policy, &edits);
 }
 
 /// What no sound state reaches, or one number alone: a clip end behind a held number that is far outside, two clip words of which one
@@ -324,12 +322,7 @@ fn an_edit_where_one_number_of_the_state_alone_leads_fails() {
             "(4u - state->bad_count) ^ state->bad_count |",
         ),
     ];
-    for (ran, (from, to)) in edited(&example(), &edits).into_iter().zip(edits) {
-        assert!(
-            ran.code == Some(1) && ran.stdout.contains("FAIL"),
-            "{from} => {to}: {ran:?}"
-        );
-    }
+    all_fail(&example(), &edits);
 }
 
 /// A duty that lies within its limits but for the sign, and a cap that is the duty itself.
@@ -339,12 +332,7 @@ fn an_edit_at_a_mirrored_duty_or_an_equal_cap_fails() {
         ("return above | (width - above);", "return above ^ (width - above);"),
         ("_flag(v12 > state->soft_cap)", "_flag(v12 >= state->soft_cap)"),
     ];
-    for (ran, (from, to)) in edited(&golden_case("constructs"), &edits).into_iter().zip(edits) {
-        assert!(
-            ran.code == Some(1) && ran.stdout.contains("FAIL"),
-            "{from} => {to}: {ran:?}"
-        );
-    }
+    all_fail(&golden_case("constructs"), &edits);
 }
 
 /// A term of the guard joined by an exclusive or shows where its neighbour is outside as well.
@@ -354,9 +342,7 @@ fn a_guard_that_joins_its_terms_wrongly_fails() {
         ("| buck12_aside(state->held[2]", "^ buck12_aside(state->held[2]"),
         ("stray |= ", "stray ^= "),
     ];
-    for (ran, (from, _)) in edited(&example(), &edits).into_iter().zip(edits) {
-        assert!(ran.code == Some(1) && ran.stdout.contains("FAIL"), "{from}: {ran:?}");
-    }
+    all_fail(&example(), &edits);
 }
 
 /// A cap that ends 0.1 % too early shows where one more step comes just below the upper limit of the duty.
@@ -366,9 +352,7 @@ fn a_soft_start_that_ends_early_or_late_fails() {
         ("_flag(v0 > 0.67999995f)", "_flag(v0 > 0.67932f)"),
         ("_flag(v0 > 0.67999995f)", "_flag(v0 > 0.68068f)"),
     ];
-    for (ran, (_, to)) in edited(&golden_case("constructs"), &edits).into_iter().zip(edits) {
-        assert!(ran.code == Some(1) && ran.stdout.contains("FAIL"), "{to}: {ran:?}");
-    }
+    all_fail(&golden_case("constructs"), &edits);
 }
 
 /// The guards stop a compiler that says in its macros what it was asked for.

@@ -233,7 +233,7 @@ pub fn tables(judged: &[Judged], law: &[Judged]) -> String {
             (true, false) => "The law alone does not meet the specification.".to_owned(),
             (false, true) => "The law alone meets the specification: the network makes it worse.".to_owned(),
             _ if law.cost == policy.cost => format!(
-                "The policy is the law alone (cost {:.3}): no network did better on the load steps of [selection].",
+                "The policy does here what the law alone does (cost {:.3}): the network adds nothing.",
                 law.cost
             ),
             _ if law.cost < policy.cost => format!(

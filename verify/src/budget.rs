@@ -141,7 +141,7 @@ impl Budget {
             ),
             false => format!(
                 "  note: a step takes up to {:.0} % of the period, and one that takes more than 100 % is late in every period, which no training \
-                 mends. Below that its duty still acts one period later: train with pwm.duty_delay = 1 in the plant file{and_there}",
+                 mends. One that takes less has a duty that acts one period later: train with pwm.duty_delay = 1 in the plant file{and_there}",
                 100.0 * most
             ),
         })

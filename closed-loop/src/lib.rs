@@ -21,6 +21,7 @@ pub mod limit;
 mod load_step;
 mod map;
 pub mod outside;
+mod part;
 pub mod read;
 pub mod refit;
 mod rest;

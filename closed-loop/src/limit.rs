@@ -17,6 +17,7 @@ use toml_input::Message;
 
 use crate::faults::Error;
 use crate::load_step::LoadStep;
+use crate::part::Part;
 use crate::scenario::settled_band;
 use crate::time_optimal::{Target, TimeOptimal};
 
@@ -56,6 +57,8 @@ pub struct Question {
     duty: f64,
     target: Target,
     planner: TimeOptimal,
+    /// From a sample inside of a PWM period to its end.
+    rest_of_period: Option<Part>,
     /// For converters whose output answers the wrong way at first.
     hold: Option<Hold>,
 }
@@ -132,10 +135,15 @@ impl Question {
         };
         let (resting, duty) = rest(&from)?;
         let (after, held) = rest(&to)?;
-        let target = Target {
-            v_out: v_ref,
-            i_l: after.sample().i_l,
+        let mut rest_of_period = match parameters.pwm.sampling_phase {
+            0.0 => None,
+            phase => Some(Part::new(&parameters, phase, 1.0)?),
         };
+        let (mut v_out, mut i_l) = (v_ref, after.sample().i_l);
+        if let Some(part) = &mut rest_of_period {
+            (v_out, i_l) = part.pass(v_out, i_l, held, &to);
+        }
+        let target = Target { v_out, i_l };
         let converter = &parameters.converter;
         let (topology, t) = (converter.topology, parameters.t_sw());
         let hold = Hold {
@@ -156,6 +164,7 @@ impl Question {
             duty,
             target,
             planner: TimeOptimal::new(&parameters, v_ref, range)?,
+            rest_of_period,
         })
     }
 
@@ -252,12 +261,13 @@ impl Question {
 
     fn attempt(&self, phase: f64, strategy: Strategy<'_>) -> Bound {
         let (mut plant, mut planner) = (self.resting.clone(), self.planner.clone());
+        let mut rest_of_period = self.rest_of_period.clone();
         let mut run = Run::new(self, phase);
         if phase > 0.0 {
             run.note(&plant.step_with_change(self.duty, &self.from, &self.to, phase));
         }
         let delay = plant.parameters().pwm.duty_delay as usize;
-        let mut pending = vec![self.duty; delay];
+        let (mut in_force, mut pending) = (self.duty, vec![self.duty; delay]);
         let beyond = self.direction() * strategy.beyond;
         let mut entered = strategy.beyond == 0.0;
         for n in 0..HORIZON {
@@ -265,12 +275,15 @@ impl Question {
             let (mut v, mut i) = (sample.v_out, sample.i_l);
             // inside the band counts only once the voltage has left it: at the step it is still at `v_ref`
             entered |= n > 0 && (v - self.v_ref).abs() < run.band && run.left;
+            if let Some(part) = &mut rest_of_period {
+                (v, i) = part.pass(v, i, in_force, &self.to);
+            }
             for duty in &pending {
                 (v, i) = planner.predict(v, i, *duty, &self.to);
             }
             let aim = if entered { 0.0 } else { beyond };
             let target = Target {
-                v_out: self.v_ref + aim,
+                v_out: self.target.v_out + aim,
                 ..self.target
             };
             let planned = match strategy.hold {
@@ -279,10 +292,8 @@ impl Question {
             };
             let share = (strategy.effort - n as f64).clamp(0.0, 1.0);
             let duty = share * self.full() + (1.0 - share) * planned;
-            if delay > 0 {
-                pending.remove(0);
-                pending.push(duty);
-            }
+            pending.push(duty);
+            in_force = pending.remove(0);
             run.note(&plant.step(duty, &self.to));
             if run.at_rest >= AT_REST {
                 break;

@@ -27,9 +27,9 @@ pub struct TimeOptimal {
 /// Where a converter is to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Target {
-    /// Sampled voltage, V.
+    /// Voltage at the start of a PWM period, V.
     pub v_out: f64,
-    /// Sampled inductor current, A.
+    /// Inductor current there, A.
     pub i_l: f64,
 }
 
@@ -46,14 +46,15 @@ const NUDGE: f64 = 1e-6;
 const NEWTON_STEPS: usize = 12;
 
 impl TimeOptimal {
-    /// On a model with these parameters, with duties within `range`. Delays and sensors are not the model's business and
-    /// are left out.
+    /// On a model with these parameters, with duties within `range`. Voltages and currents are those at the start of a PWM
+    /// period, wherever the plant is sampled; delays and sensors are left out.
     ///
     /// # Errors
     /// If the parameters are not those of a converter.
     pub fn new(parameters: &Parameters, v_ref: f64, range: [f64; 2]) -> Result<Self, Error> {
         let mut parameters = parameters.clone();
         parameters.pwm.duty_delay = 0;
+        parameters.pwm.sampling_phase = 0.0;
         parameters.sensors = plant::Sensors::default();
         let converter = &parameters.converter;
         let t = parameters.t_sw();

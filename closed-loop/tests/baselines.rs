@@ -5,7 +5,7 @@
 use closed_loop::baselines::{Baseline, Kind};
 use closed_loop::scenario::{Finding, Task, survey_all};
 use closed_loop::{Classical, Converter, LoadKind, LoadStep, Trajectory, follow};
-use plant::{Parameters, Sample};
+use plant::{Carrier, Parameters, Sample};
 
 fn task() -> Task {
     Task {
@@ -114,4 +114,23 @@ fn runs_from_the_start_find_what_the_survey_finds() {
     parameters.sensors.v_out.noise = 0.05;
     let (finding, _) = examine(Kind::Cascade, &parameters, LoadStep::from([200.0, 1000.0]));
     assert_eq!(finding, findings(Kind::Cascade, &parameters)[0]);
+}
+
+/// A sample inside of the period is acted on at the next start, so it costs less than a whole period of delay.
+#[test]
+fn sampled_inside_of_the_period_they_do_no_worse_than_a_period_late() {
+    for (kind, _, late) in KNOWN {
+        for phase in [0.2, 0.5, 0.8] {
+            for carrier in [Carrier::Trailing, Carrier::Centre] {
+                let mut parameters = Parameters::paper_model();
+                (parameters.pwm.sampling_phase, parameters.pwm.carrier) = (phase, carrier);
+                for (finding, known) in findings(kind, &parameters).iter().zip(late[1]) {
+                    let what = format!("{kind}, {carrier:?} sampled at {phase}: {finding:?}");
+                    assert!(finding.worst.deviation < 1.05 * known, "{what}, known {known}");
+                    assert!(finding.worst.settling < 6e-3, "{what}");
+                    assert!(finding.worst.tail_max < 0.06, "{what}");
+                }
+            }
+        }
+    }
 }

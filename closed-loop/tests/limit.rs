@@ -6,7 +6,7 @@ use closed_loop::baselines::{Baseline, Kind};
 use closed_loop::limit::{Bound, Question, averaged};
 use closed_loop::scenario::{Finding, Task, survey};
 use closed_loop::{Converter, LoadStep};
-use plant::{Load, Parameters, Plant};
+use plant::{Carrier, Load, Parameters, Plant};
 
 const STEPS: [[f64; 2]; 6] = [
     [200.0, 500.0],
@@ -200,4 +200,27 @@ fn a_load_the_duties_cannot_carry_has_no_limit() {
             .contains("does not rest at 100 V with a duty within 0..0.4"),
         "{error}"
     );
+}
+
+/// Sampled inside of the period a duty waits for a share of it, so the limits lie between those without and with a period of
+/// delay. The ripple of the voltage, .03 V of these plants, is the difference that the sampling instant itself makes.
+#[test]
+fn the_limits_of_a_sample_inside_of_the_period_lie_between_none_and_a_period_of_delay() {
+    for carrier in [Carrier::Trailing, Carrier::Centre] {
+        let mut nominal = Parameters::paper_model();
+        nominal.pwm.carrier = carrier;
+        for step in [[200.0, 500.0], [200.0, 1000.0], [1000.0, 200.0]] {
+            let of = |parameters: &Parameters| question(parameters, step, [0.0, 1.0]).answer(&[]).behind;
+            let (prompt, late) = (of(&nominal), of(&delayed(&nominal, 1)));
+            for phase in [0.25, 0.5, 0.75] {
+                let mut inside = nominal.clone();
+                inside.pwm.sampling_phase = phase;
+                let found = of(&inside);
+                let what = format!("{carrier:?} {step:?} sampled at {phase}: {prompt:?}, {found:?}, {late:?}");
+                assert!(found.extreme > prompt.extreme - 0.03 && found.extreme < late.extreme + 0.03, "{what}");
+                // counted in samples: the last one outside of the band may be another
+                assert!(found.settling < late.settling + 1e-4, "{what}");
+            }
+        }
+    }
 }

@@ -19,7 +19,8 @@ pub struct Cascade {
 
 /// Gains without delay and with one period of it: of the current, of the voltage, and the shares of both that are
 /// integrated each period. Found by random search for the least deviation and settling time on the paper's two plants
-/// (200 to 1000 W and back), rounded. Longer delays divide the gains by the periods.
+/// (200 to 1000 W and back), rounded. A sample inside of the period
+/// counts as one of them; longer delays divide the gains by the periods.
 const GAINS: [[f64; 4]; 2] = [[1.0, 0.8, 0.1, 0.2], [0.65, 0.28, 0.01, 0.1]];
 
 /// A PI regulator that stops integrating at its limits.
@@ -51,8 +52,8 @@ impl Cascade {
     /// Designed by the rule above.
     #[must_use]
     pub fn new(design: &Design) -> Self {
-        let [current, voltage, current_share, voltage_share] = GAINS[design.delay.min(1)];
-        let n = design.delay.max(1) as f64;
+        let [current, voltage, current_share, voltage_share] = GAINS[design.begun().min(1)];
+        let n = design.begun().max(1) as f64;
         let outer = f64::max(n, voltage * design.periods_of_zero(design.i_out));
         Self {
             v_ref: design.v_ref,

@@ -4,16 +4,21 @@ use plant::{Load, Parameters, Rectifier, Signals};
 
 use super::Design;
 use crate::faults::Error;
+use crate::part::Part;
 use crate::time_optimal::{Target, TimeOptimal};
 
-/// Predictive control on voltage, current and the load's power, with the ideal converter as model: over the delay by
-/// prediction, then [`TimeOptimal`]. What the plant loses beyond the model is learnt from the error of the predicted current.
+/// Predictive control on voltage, current and the load's power, with the ideal converter as model: to where
+/// its duty acts by prediction, then [`TimeOptimal`]. What the plant loses beyond the model is learnt from the error of the predicted current.
 ///
 /// No gain is tuned but `LEARNING`. It takes any load for constant power, and the current for continuous.
 #[derive(Debug, Clone)]
 pub struct Deadbeat {
     design: Design,
     planner: TimeOptimal,
+    /// From a sample inside of the PWM period to its end, and from the start to the next sample.
+    parts: Option<[Part; 2]>,
+    /// Acts until the next start of a PWM period.
+    in_force: f64,
     /// Commanded, not yet in force; the oldest first.
     pending: Vec<f64>,
     /// Duty that makes up for losses.
@@ -43,8 +48,13 @@ impl Deadbeat {
         model.converter.f_sw = parameters.converter.f_sw;
         model.pwm.carrier = parameters.pwm.carrier;
         model.load.v_fold = parameters.load.v_fold;
-        model.pwm.sampling_phase = parameters.pwm.sampling_phase;
+        let parts = match design.phase {
+            0.0 => None,
+            phase => Some([Part::new(&model, phase, 1.0)?, Part::new(&model, 0.0, phase)?]),
+        };
         Ok(Self {
+            parts,
+            in_force: design.rest(),
             planner: TimeOptimal::new(&model, design.v_ref, [0.0, design.most()])?,
             pending: vec![design.rest(); design.delay],
             has_diode: parameters.converter.rectifier == Rectifier::Diode,
@@ -65,13 +75,14 @@ impl Deadbeat {
         {
             self.correction += LEARNING * (expected - i) / gain;
         }
-        let mut expected = None;
-        for n in 0..self.pending.len() {
-            (v, i) = self.planner.predict(v, i, self.pending[n], &load);
-            // with a delay the next sample is decided by the oldest duty under way
-            expected = expected.or(Some(i));
+        if let Some([rest, _]) = &mut self.parts {
+            (v, i) = rest.pass(v, i, self.in_force, &load);
         }
-        let valley = load.power / self.design.v_ref / self.design.give() - self.design.below_mean();
+        let at_start = (v, i);
+        for duty in &self.pending {
+            (v, i) = self.planner.predict(v, i, *duty, &load);
+        }
+        let valley = load.power / self.design.v_ref / self.design.give() - self.design.below_at_start();
         let target = Target {
             v_out: self.design.v_ref,
             // a diode blocks: only a synchronous leg has a valley below 0
@@ -81,14 +92,15 @@ impl Deadbeat {
         let duty = (planned + self.correction).clamp(0.0, self.design.most());
         // what the model is to believe: the duty less its correction
         let believed = (duty - self.correction).clamp(0.0, self.design.most());
-        if expected.is_none() {
-            expected = Some(self.planner.predict(v, i, believed, &load).1);
-        }
-        self.expected = expected;
-        if !self.pending.is_empty() {
-            self.pending.remove(0);
-            self.pending.push(believed);
-        }
+        self.pending.push(believed);
+        self.in_force = self.pending.remove(0);
+        // with a delay the next sample is decided by the oldest duty under way
+        let (v, i) = at_start;
+        let next = match &mut self.parts {
+            Some([_, first]) => first.pass(v, i, self.in_force, &load),
+            None => self.planner.predict(v, i, self.in_force, &load),
+        };
+        self.expected = Some(next.1);
         duty
     }
 }

@@ -7,8 +7,8 @@ use super::Design;
 /// The inductor current is told to be the load current plus a share of the charge that is missing, and gets there within
 /// one period.
 ///
-/// The tuning rule: `i_ref = i_out + C/T (v_ref - v)/(2 (1+delay))`, the current loop deadbeat
-/// (`duty = (v + L/T (i_ref - i_l))/v_in`) on current and voltage predicted over the delay. For the losses that this leaves
+/// The tuning rule: `i_ref = i_out + C/T (v_ref - v)/(2 (1+late))`, the current loop deadbeat
+/// (`duty = (v + L/T (i_ref - i_l))/v_in`) on current and voltage predicted to where it acts, `late` periods on. For the losses that this leaves
 /// out, an integral of the voltage error with `INTEGRAL_PERIODS` as its time, at rest only: while the correction is
 /// below the ripple.
 ///
@@ -19,6 +19,8 @@ use super::Design;
 pub struct FeedForward {
     design: Design,
     sum: f64,
+    /// Acts until the next start of a PWM period.
+    in_force: f64,
     /// Commanded, not yet in force; the oldest first.
     pending: Vec<f64>,
 }
@@ -33,6 +35,7 @@ impl FeedForward {
     pub fn new(design: &Design) -> Self {
         Self {
             sum: 0.0,
+            in_force: design.rest(),
             pending: vec![design.rest(); design.delay],
             design: *design,
         }
@@ -48,12 +51,20 @@ impl FeedForward {
             topology,
             ..
         } = self.design;
-        let (half_ripple, below_mean) = (self.design.half_ripple(), self.design.below_mean());
-        let n = (1 + self.design.delay) as f64;
+        let (half_ripple, below_mean) = (self.design.half_ripple(), self.design.below_at_start());
+        let n = 1.0 + self.design.late();
         let gain = self.design.by_voltage(measured.i_out);
         let integral = gain / (INTEGRAL_PERIODS * n);
         let (mut v, mut i) = (measured.v_out, measured.i_l);
         // what is commanded now acts behind these: control the state in which it will be met
+        let wait = self.design.wait();
+        if wait > 0.0 {
+            let on = self.design.on(self.in_force, self.design.phase, 1.0) / wait;
+            let (span, level) = (topology.span(measured.v_in, v), topology.level(measured.v_in, v));
+            let next = i + wait * t / l * (on * span - level);
+            v += wait * t / c * (topology.give(on) * 0.5 * (i + next) - measured.i_out);
+            i = next;
+        }
         for duty in &self.pending {
             let (span, level) = (topology.span(measured.v_in, v), topology.level(measured.v_in, v));
             let next = i + t / l * (duty * span - level);
@@ -67,10 +78,8 @@ impl FeedForward {
         if duty == wanted && (gain * (v_ref - v)).abs() < half_ripple {
             self.sum += integral * (v_ref - v);
         }
-        if !self.pending.is_empty() {
-            self.pending.remove(0);
-            self.pending.push(duty);
-        }
+        self.pending.push(duty);
+        self.in_force = self.pending.remove(0);
         duty
     }
 }

@@ -22,18 +22,18 @@ pub struct Pid {
 }
 
 /// `b Kp`, `b Kd` and `b Ki` per period, without delay and with one period of it. Found by random search for the least
-/// deviation and settling time on the paper's two plants (200 to 1000 W and back), rounded. Longer delays divide them by
-/// the square, the first and the third power of the periods.
+/// deviation and settling time on the paper's two plants (200 to 1000 W and back), rounded. A sample inside of the period counts as
+/// one of delay; longer delays divide them by the square, the first and the third power of the periods.
 const GAINS: [[f64; 3]; 2] = [[0.3, 0.8, 0.005], [0.05, 0.44, 0.006]];
 
 impl Pid {
     /// Designed by the rule above.
     #[must_use]
     pub fn new(design: &Design) -> Self {
-        let [proportional, derivative, integral] = GAINS[design.delay.min(1)];
+        let [proportional, derivative, integral] = GAINS[design.begun().min(1)];
         // the derivative makes the crossover: its gain over the periods
         let n = f64::max(
-            design.delay.max(1) as f64,
+            design.begun().max(1) as f64,
             derivative * design.periods_of_zero(design.i_out),
         );
         let unit = design.l * design.c / (design.span() * design.t * design.t) / design.give();

@@ -119,6 +119,15 @@ pub fn say_results(folder: &Path, files: &BTreeMap<String, String>, summary: &st
     say(&format!("\n{count} files in {out}; to look at: {out}/{page}"))
 }
 
+/// Writes one file that may not exist yet.
+///
+/// # Errors
+/// If it exists or cannot be written.
+pub fn write_new_one(path: &Path, bytes: Vec<u8>) -> Result<(), Failure> {
+    let (folder, name) = split(path)?;
+    write_new(folder, &BTreeMap::from([(name, bytes)]))
+}
+
 /// Writes one file, and others by name beside it, none of which may exist yet.
 ///
 /// # Errors
@@ -127,7 +136,11 @@ pub fn write_new_all(path: &Path, text: &str, beside: &BTreeMap<String, Vec<u8>>
     let (folder, name) = split(path)?;
     let mut files = beside.clone();
     files.insert(name, text.as_bytes().to_vec());
-    write_if(folder, &files, || {
+    write_new(folder, &files)
+}
+
+fn write_new(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<(), Failure> {
+    write_if(folder, files, || {
         let mut paths = files.keys().map(|name| folder.join(name));
         let Some(path) = paths.find(|path| fs::symlink_metadata(path).is_ok()) else {
             return Ok(());

@@ -217,7 +217,10 @@ fn the_limits_of_a_sample_inside_of_the_period_lie_between_none_and_a_period_of_
                 inside.pwm.sampling_phase = phase;
                 let found = of(&inside);
                 let what = format!("{carrier:?} {step:?} sampled at {phase}: {prompt:?}, {found:?}, {late:?}");
-                assert!(found.extreme > prompt.extreme - 0.03 && found.extreme < late.extreme + 0.03, "{what}");
+                assert!(
+                    found.extreme > prompt.extreme - 0.03 && found.extreme < late.extreme + 0.03,
+                    "{what}"
+                );
                 // counted in samples: the last one outside of the band may be another
                 assert!(found.settling < late.settling + 1e-4, "{what}");
             }

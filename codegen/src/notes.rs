@@ -41,8 +41,9 @@ pub fn notes<'a>(
     if let Some(bound) = sizes.q_error_bound {
         notes.push(format!(
             "no Q value is further than {} from real arithmetic, for every observation the clips let through, however rare; \
-             what the trainer's own observations lose stands below `decisions` in `policyc inspect`, and `policyc certify` says more",
-            quantity(bound, "", 3)
+             {}, and `policyc certify` says more",
+            quantity(bound, "", 3),
+            at_golden(policy)
         ));
     }
     if let Some(bound) = sizes.duty_error_bound {
@@ -53,6 +54,16 @@ pub fn notes<'a>(
         ));
     }
     notes
+}
+
+/// Where it stands what the trainer's own observations lose.
+fn at_golden(policy: &Policy) -> &'static str {
+    match policy.golden {
+        Some(_) => "what the trainer's own observations lose stands below `decisions` in `policyc inspect`",
+        None => {
+            "golden answers would tell what it changes where the converter lives (`policyc replay --golden` makes them of a log)"
+        }
+    }
 }
 
 /// Why fused operations are no gain on a processor, where they are none.

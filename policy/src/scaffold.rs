@@ -240,7 +240,7 @@ fn golden(draft: &Draft, folder: &str) -> String {
         // names of the outputs are the user's: the last layer alone outlives a change of them
         _ if !draft.several.is_empty() => "output [n, columns of the last layer]",
         1 => "output [n], duty [n]",
-        _ => "q [n, actions], action [n]",
+        _ => "q [n, actions] or action [n] or both",
     };
     let mut text = format!("{beside}golden = {golden}   # obs [n, inputs], {answers} from the trainer\n");
     if draft.is_drawn {

@@ -242,6 +242,11 @@ fn what_cannot_be_simulated_is_refused_and_nothing_is_written() {
         "simulate s.toml --policy policy --out out --plant nowhere.toml",
         &["nowhere.toml"],
     );
+    // the paper's loads are none of this converter's
+    with(
+        "plant = \"plants/buck-48-12.toml\"\nv_ref = 12.0\n",
+        &["names no load step", "holds 12 V", "load_steps = [["],
+    );
     with("v_ref = 100.0\n", &["--> s.toml", "no plant", "--plant"]);
     with("plant = \"plants/none.toml\"\n", &["plants/none.toml"]);
     with(

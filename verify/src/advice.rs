@@ -138,7 +138,10 @@ fn what_it_changes(policy: &Policy, format: NumericFormat) -> String {
     }
     let found = decisions(&policy.clone().with_format(format), None).filter(|decisions| !decisions.kept());
     match found {
-        None => "; `policyc certify` says what it does to the decision".to_owned(),
+        None if policy.golden.is_none() => {
+            "; golden answers would tell what it changes of the decisions (`policyc replay --golden` makes them of a log)".to_owned()
+        }
+        None => "; it changes no more golden decisions than allowed".to_owned(),
         Some(decisions) => {
             let what = decisions.beyond().map(|(output, own)| {
                 let of = output.map_or_else(String::new, |name| format!(" of {name}"));

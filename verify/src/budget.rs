@@ -134,14 +134,15 @@ impl Budget {
         (self.fit != Fit::Missed && most > HALF).then(|| match most < 1.0 {
             true => format!(
                 "  note: a step takes up to {:.0} % of the period. Sampled within the first {:.0} % of it, the duty acts from the next start on; \
-                 later, it can miss that and act one period later: train with pwm.duty_delay = 1 in the plant file then{and_there}. So does a \
-                 training that sampled at the start and whose duty acted at once, which no timer does",
+                 later, it can miss that start and act one period later, and the training has to have had that: pwm.duty_delay = 1 in the \
+                 plant file{and_there}. No timer does what a training had whose duty acted at the instant of the sample: that is one to repeat, too",
                 100.0 * most,
                 100.0 * (1.0 - most)
             ),
             false => format!(
                 "  note: a step takes up to {:.0} % of the period, and one that takes more than 100 % is late in every period, which no training \
-                 mends. One that takes less has a duty that acts one period later: train with pwm.duty_delay = 1 in the plant file{and_there}",
+                 mends. One that takes less has a duty that acts one period later, and the training has to have had that: pwm.duty_delay = 1 in the \
+                 plant file{and_there}",
                 100.0 * most
             ),
         })

@@ -151,6 +151,13 @@ pub struct Replay {
     /// Rows at the start of each episode that are not compared, where the environment begins with another memory
     #[arg(long, value_name = "ROWS", default_value_t = 0, hide_default_value = true)]
     pub skip: usize,
+    /// Numeric format in the place of the contract's
+    #[arg(long, value_parser = format())]
+    pub format: Option<NumericFormat>,
+    /// If the log is equal, write it as golden answers, a safetensors file that does not exist yet: its observations, or where it does not have
+    /// all of them the contract's, with its actions or duties
+    #[arg(long, value_name = "FILE")]
+    pub golden: Option<PathBuf>,
     /// Largest difference that is equal, as a share of the largest logged magnitude of the feature
     #[arg(long, value_name = "SHARE", default_value_t = ::verify::replay::TOLERANCE, value_parser = share)]
     pub tolerance: f64,

@@ -21,7 +21,11 @@ struct Answer {
 
 /// Compares and reports.
 pub fn run(options: &Replay) -> Result<Outcome, Failure> {
-    let policy = super::load_without_golden(&options.policy, options.outside)?;
+    let policy = super::load_for_a_log(&options.policy, options.outside)?;
+    let policy = match options.format {
+        Some(format) => policy.with_format(format),
+        None => policy,
+    };
     let working = Working::new("replaying the log");
     let log = Log::open(&policy, &options.log, &options.map.join(","))?;
     if !log.compares() {
@@ -55,10 +59,25 @@ pub fn run(options: &Replay) -> Result<Outcome, Failure> {
         talk::note(&format!("{}: {note}", options.log.display()));
     }
     let equal = replay.equal();
+    let golden = match &options.golden {
+        Some(file) if equal || replay.format.is_some() => Some((file, replay::answers(&policy, &log)?)),
+        _ => None,
+    };
     if options.json {
         output::say_json(&Answer { equal, replay })?;
     } else {
         output::say(replay::text(&policy, &replay).trim_end())?;
+    }
+    if let Some((file, golden)) = golden {
+        let answers = golden.count;
+        output::write_new_one(file, policy::golden_file(&policy, &golden)?)?;
+        talk::note(&format!(
+            "{}: {answers} golden answers; name it in [network]: golden = \"{}\"",
+            file.display(),
+            file.file_name().unwrap_or_default().display()
+        ));
+    } else if let Some(file) = &options.golden {
+        talk::note(&format!("{}: not written, since the log is not equal", file.display()));
     }
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }

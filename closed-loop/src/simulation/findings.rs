@@ -135,6 +135,7 @@ impl Setting {
             told(&policy, voltage, !references.is_empty(), file)?;
             reaches(converter.parameters(), voltage, file)?;
         }
+        of_this_converter(&scenario, v_ref, file)?;
         suits(&policy, converter.parameters(), v_ref, file)?;
         behind(&policy, &scenario.observers, file)?;
         draws(converter.parameters(), &scenario.load_steps, file)?;
@@ -228,6 +229,21 @@ fn told(policy: &Policy, voltage: f64, steps: bool, file: &Path) -> Result<(), E
     }
     let message = Message::new("the policy takes no such reference").found(format!("{voltage} V"));
     let message = message.expected(format!("{low} to {high} V, the range of its signal `v_ref`"));
+    Err(Fault::in_file(file, message).into())
+}
+
+/// The load steps that are taken where a scenario names none are those of a converter that holds this, V.
+const DEFAULT_STEPS_HOLD: f64 = 100.0;
+
+/// Whether the load steps are meant for a converter that holds `v_ref` V.
+fn of_this_converter(scenario: &Scenario, v_ref: f64, file: &Path) -> Result<(), Error> {
+    if !scenario.default_steps || v_ref == DEFAULT_STEPS_HOLD {
+        return Ok(());
+    }
+    let message = Message::new("the scenario names no load step")
+        .found(format!("a converter that holds {v_ref} V"))
+        .expected("load_steps in W, current_steps in A or resistance_steps in ohm")
+        .hint("load_steps = [[20, 80], [80, 20]]  # W before and behind; a training has its own in [evaluation] of its file");
     Err(Fault::in_file(file, message).into())
 }
 

@@ -102,7 +102,7 @@ impl Log {
             .iter()
             .map(|names| [0, 1, 2].map(|which| numbers(&names[which])))
             .collect();
-        let observed = observations.iter().map(|names| numbers(names.first()?)).collect();
+        let observed: Vec<Option<Vec<f64>>> = observations.iter().map(|names| numbers(names.first()?)).collect();
         faults.propagate()?;
         let begins = begins(sheet.rows(), episode.as_deref());
         if let Some(time) = time {
@@ -113,6 +113,9 @@ impl Log {
         let done = done.collect::<Result<_, _>>()?;
         let mut notes = located.notes(&sheet, &[]);
         notes.extend(unread_duty(&sheet, &located, &names));
+        if observed.iter().all(Option::is_none) {
+            notes.extend(unread_observations(policy, &sheet, &located));
+        }
         Ok(Self {
             samples,
             begins,
@@ -223,6 +226,28 @@ fn unread_duty(sheet: &Sheet, located: &Located, names: &[[String; 3]]) -> Optio
         format!(
             "`{name}` looks like a duty: with --map {previous}={name} where it is the duty before the sample, or --map {duty}={name} where it \
              follows from it, the duties that the actions mean are compared, too"
+        )
+    })
+}
+
+/// Columns that count as many features as the network has, under another stem than `obs_`, where no observation was read.
+fn unread_observations(policy: &Policy, sheet: &Sheet, located: &Located) -> Option<String> {
+    let unread = located.unused.iter().filter_map(|index| sheet.columns().get(*index));
+    let unread: Vec<&str> = unread.map(|column| column.name.as_str()).collect();
+    let features = policy.features.len();
+    let stem = unread.iter().find_map(|name| {
+        let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        let counted = |first: usize| (first..first + features).all(|n| unread.contains(&format!("{stem}{n}").as_str()));
+        let first = [0, 1]
+            .into_iter()
+            .find(|first| stem.len() < name.len() && counted(*first))?;
+        Some((stem, first))
+    });
+    stem.map(|(stem, first)| {
+        let pairs: Vec<String> = (0..features).map(|n| format!("obs_{n}={stem}{}", first + n)).collect();
+        format!(
+            "`{stem}{first}` and on count as many as the network's inputs; if they are its observations: --map {}",
+            pairs.join(",")
         )
     })
 }

@@ -9,6 +9,7 @@
 //!     └► his observation, his action ─► compare ─► explain
 //! ```
 
+mod answers;
 mod chain;
 mod duties;
 mod explain;
@@ -21,11 +22,13 @@ mod text;
 mod values;
 mod variants;
 
+use interp::decisions::Decisions;
 use interp::{Controller, Real, Trace};
 use policy::{DutyPath, Policy, Scalar};
 use serde::Serialize;
 use toml_input::{Faults, Message};
 
+pub use answers::answers;
 pub use duties::DutyResult;
 pub use log::Log;
 pub use text::text;
@@ -61,6 +64,9 @@ pub struct Replay {
     /// Signals with samples outside their plausible range: name, rows, smallest and largest logged value. They were taken as they
     /// are; the controller will hold the last good sample.
     pub outside: Vec<(String, usize, [f64; 2])>,
+    /// What an integer format changes of the decisions, where all that the log has is equal in floats.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub format: Option<Decisions>,
     /// Share of the largest logged magnitude of a feature that is still equal.
     pub tolerance: f64,
     /// What a reader of the log should know.
@@ -142,9 +148,13 @@ pub struct ActionResult {
 }
 
 impl Replay {
-    /// Nothing that the log has is other than the contract says.
+    /// Nothing that the log has is other than the contract says, but for decisions that its integer format may change.
     #[must_use]
     pub fn equal(&self) -> bool {
+        // all else was equal, else it would not be there
+        if let Some(decisions) = &self.format {
+            return decisions.kept();
+        }
         let other = |output: &Commanded<'_>| output.differs() || output.has_other_duties();
         !self.commands().iter().any(other) && self.compared().all(|(_, compared)| compared.first_line.is_none())
     }
@@ -194,6 +204,9 @@ pub struct Wanted {
 pub fn replay(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faults> {
     let mut replay = compared(policy, log, wanted)?;
     replay.late = late::column(policy, log, wanted, &replay);
+    if replay.late.is_none() && !replay.equal() {
+        replay.format = answers::changed(policy, log, wanted)?;
+    }
     Ok(replay)
 }
 
@@ -263,6 +276,7 @@ fn compared(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faults
         duties: one.1,
         outputs: several,
         late: None,
+        format: None,
         outside: log.outside(policy),
         tolerance,
         notes: log.notes.clone(),

@@ -1,5 +1,6 @@
 //! A replay in words.
 
+use interp::decisions::Decisions;
 use policy::{DutyPath, Feature, Filter, Policy};
 use report::grouped;
 
@@ -84,8 +85,17 @@ fn words(policy: &Policy, replay: &Replay) -> Vec<String> {
         }
     }
     words.extend(unreached_words(policy, replay));
-    for (output, path) in replay.commands().into_iter().zip(policy.paths()) {
-        words.extend(command_words(policy, replay, output, &path));
+    match &replay.format {
+        Some(decisions) => {
+            // rows of the log stand in the place of golden vectors
+            let lines = crate::text::decisions(policy, decisions).into_iter();
+            words.extend(lines.map(|line| line.replace("most at golden vector", "most in row (from 0)")));
+        }
+        None => {
+            for (output, path) in replay.commands().into_iter().zip(policy.paths()) {
+                words.extend(command_words(policy, replay, output, &path));
+            }
+        }
     }
     for (signal, rows, [low, high]) in &replay.outside {
         words.push(format!(
@@ -232,12 +242,27 @@ fn verdict(policy: &Policy, replay: &Replay) -> String {
     if let Some(late) = &replay.late {
         return format!("DIFFERENT: `{late}` is logged one row late, and nothing else differs");
     }
+    if let Some(decisions) = &replay.format {
+        return by_format(policy, decisions) + &beyond_ranges(replay);
+    }
     let kind = Kind::of(policy, replay);
     if !replay.equal() {
         return different(replay, &kind);
     }
     let has_commands = replay.commands().iter().any(|output| output.actions.is_some());
     equal(replay, &kind, compared, has_commands) + &beyond_ranges(replay)
+}
+
+/// Where everything is equal in floats.
+fn by_format(policy: &Policy, decisions: &Decisions) -> String {
+    let format = policy.numeric_format.name();
+    match decisions.kept() {
+        true => format!("equal in f32, and {format} changes no more than is allowed"),
+        false => format!(
+            "DIFFERENT: equal in f32, but {format} changes more than is allowed; to accept it, {} in [network]",
+            decisions.remedy()
+        ),
+    }
 }
 
 /// What the verdict does not hold for: the log was replayed as it is, and the controller believes no such sample.

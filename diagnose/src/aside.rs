@@ -125,8 +125,9 @@ pub fn explained_without(
             say(what);
         }
     };
-    looks.into_iter().take(LOOKS).find_map(|part| {
-        if !work.goes_on() {
+    looks.into_iter().take(LOOKS).enumerate().find_map(|(place, part)| {
+        // two searches in vain that took half of the budget: a third would take the rest
+        if !work.goes_on() || place > 0 && !work.half_is_left() {
             return None;
         }
         let mut found = examined(part.taken_from(records), base, work, say);

@@ -3,12 +3,13 @@
 
 use std::ops::Range;
 
-use plant::Topology;
+use plant::{Parameters, Topology};
 
 use crate::basis::Basis;
+use crate::fit::State;
 use crate::ideal;
 use crate::parallel;
-use crate::problem::{Problem, dot};
+use crate::problem::{Problem, axpy, dot};
 use crate::record::{CHANNELS, Record};
 
 /// Counts per period that are looked at, and how far apart: half a count of the duty moves by less than a tenth. Below 8 counts no
@@ -25,20 +26,31 @@ const MOST_SHARE: f64 = 1.3;
 /// neither damps nor drives the swing.
 const FINE: usize = 4;
 
-/// Counts per period (whole or not) whose rounding looks most like `residual`: ends and middles of the `count` best pieces.
-pub(crate) fn likely(problem: &Problem, basis: &Basis, residual: &[f64], count: usize) -> Vec<f64> {
+/// Counts per period (whole or not) whose rounding looks most like what `from` leaves: ends and middles of the `count` best pieces.
+///
+/// `from` is where the other causes end: a filter that rings at another frequency than that of the model as given answers to a rounding as
+/// that filter does. The causes there follow along `beside`, what each parameter moves.
+pub(crate) fn likely(
+    problem: &Problem,
+    basis: &Basis,
+    (from, beside): (&State, &[Vec<f64>]),
+    count: usize,
+) -> Vec<f64> {
+    let (plant, residual) = (&from.model.plant, &from.residual);
     let numbers: Vec<f64> = (0..=((MOST - FEWEST) / APART) as usize)
         .map(|n| FEWEST + n as f64 * APART)
         .collect();
+    let beside = orthonormal(beside);
     let projected = |moved: &(dyn Fn(f64) -> f64 + Sync)| {
-        let mut column = response(problem, moved);
-        for (value, left) in column.iter_mut().zip(residual) {
+        let mut column = response(problem, plant, moved);
+        for (value, left) in column.iter_mut().zip(residual.iter()) {
             // where nothing counts
             if *left == 0.0 {
                 *value = 0.0;
             }
         }
         basis.project(&mut column);
+        take_out(&mut column, &beside);
         column
     };
     let levels = levels(problem);
@@ -85,6 +97,32 @@ pub(crate) fn likely(problem: &Problem, basis: &Basis, residual: &[f64], count: 
     found
 }
 
+/// Directions of length 1, each at right angles to those before it; what lies in these but for rounding is left out.
+fn orthonormal(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let mut known: Vec<Vec<f64>> = Vec::new();
+    for column in columns {
+        let mut one = column.clone();
+        take_out(&mut one, &known);
+        let length = dot(&one, &one).sqrt();
+        if length > NEW * dot(column, column).sqrt() {
+            one.iter_mut().for_each(|value| *value /= length);
+            known.push(one);
+        }
+    }
+    known
+}
+
+/// Of a direction at most this share of the length may be in those before it, or it is rounding.
+const NEW: f64 = 1e-5;
+
+/// Leaves of `column` what is at right angles to all of `known`.
+fn take_out(column: &mut [f64], known: &[Vec<f64>]) {
+    for one in known {
+        let share = dot(one, column);
+        axpy(column, -share, one);
+    }
+}
+
 /// Records with more levels of the duty than these are followed for each number of counts: beyond it, the products of their responses cost
 /// as much.
 const FEW_LEVELS: usize = 64;
@@ -126,7 +164,7 @@ fn pieces(problem: &Problem, numbers: &[f64]) -> Vec<Range<usize>> {
 }
 
 /// Change of the signals over their noise when each duty is `moved` by so much.
-fn response(problem: &Problem, moved: &(dyn Fn(f64) -> f64 + Sync)) -> Vec<f64> {
+fn response(problem: &Problem, plant: &Parameters, moved: &(dyn Fn(f64) -> f64 + Sync)) -> Vec<f64> {
     let mut out = vec![0.0; problem.len()];
     for (record, offset) in problem.records.iter().zip(&problem.offsets).filter(|(r, _)| !r.settled) {
         for segment in &record.segments {
@@ -137,7 +175,7 @@ fn response(problem: &Problem, moved: &(dyn Fn(f64) -> f64 + Sync)) -> Vec<f64> 
                 let next = (row + 1).min(record.rows() - 1);
                 // sampled inside a PWM period, the way to the next sample belongs to two of them
                 for (row, share) in [(row, 1.0 - record.phase), (next, record.phase)] {
-                    (v, i) = advanced(problem, record, row, moved(record.duty[row]), share, (v, i));
+                    (v, i) = advanced((problem, plant), (record, row), moved(record.duty[row]), share, (v, i));
                 }
             }
         }
@@ -150,14 +188,12 @@ const GIVE: f64 = 0.05;
 
 /// A share of the period of `row`.
 fn advanced(
-    problem: &Problem,
-    record: &Record,
-    row: usize,
+    (problem, p): (&Problem, &Parameters),
+    (record, row): (&Record, usize),
     moved: f64,
     share: f64,
     (mut v, mut i): (f64, f64),
 ) -> (f64, f64) {
-    let p = &problem.base.plant;
     let duty = record.duty[row];
     let topology = p.converter.topology;
     let v_in = p.converter.v_in * record.v_in_ratio;
@@ -190,14 +226,14 @@ mod tests {
     use measured::{ColumnMap, Sheet};
     use plant::Parameters;
 
-    use super::{levels, response, rounded};
+    use super::{dot, levels, likely, response, rounded};
     use crate::drive::Model;
+    use crate::fit::State;
     use crate::problem::Problem;
     use crate::record::Record;
 
-    #[test]
-    fn a_rounding_is_the_sum_of_what_it_does_at_each_level() {
-        let model = Parameters::paper_table();
+    /// Three levels of the duty, 80 rows.
+    fn problem(model: &Parameters) -> Problem {
         let mut text = "t,d,v_o,i_load\n".to_owned();
         for n in 0..80 {
             let duty = [0.5, 0.437, 0.561][n / 30];
@@ -209,18 +245,45 @@ mod tests {
             );
         }
         let sheet = Sheet::parse(Path::new("run.csv"), text.into(), &Record::file_options()).unwrap();
-        let record = Record::read(&sheet, &ColumnMap::default(), &model).unwrap();
-        let problem = Problem::new(vec![record], Model::new(&model));
+        let record = Record::read(&sheet, &ColumnMap::default(), model).unwrap();
+        Problem::new(vec![record], Model::new(model))
+    }
+
+    #[test]
+    fn a_rounding_is_the_sum_of_what_it_does_at_each_level() {
+        let model = Parameters::paper_table();
+        let problem = problem(&model);
         let levels = levels(&problem);
         assert_eq!(levels, [0.437, 0.5, 0.561]);
-        let whole = response(&problem, &|duty| rounded(duty, 33.3) - duty);
+        let whole = response(&problem, &model, &|duty| rounded(duty, 33.3) - duty);
         let mut sum = vec![0.0; whole.len()];
         for level in levels {
-            let unit = response(&problem, &|duty| f64::from(u8::from(duty == level)));
+            let unit = response(&problem, &model, &|duty| f64::from(u8::from(duty == level)));
             let by = rounded(level, 33.3) - level;
             sum.iter_mut().zip(unit).for_each(|(sum, unit)| *sum += by * unit);
         }
         let most = whole.iter().fold(0.0f64, |most, value| most.max(value.abs()));
         assert!(most > 0.01 && whole.iter().zip(&sum).all(|(a, b)| (a - b).abs() < 1e-9 * most));
+    }
+
+    #[test]
+    fn a_rounding_is_sought_in_the_filter_that_other_causes_have_made() {
+        let model = Parameters::paper_table();
+        let problem = problem(&model);
+        let mut real = model.clone();
+        real.converter.capacitance *= 0.4;
+        let residual = response(&problem, &real, &|duty| rounded(duty, 37.0) - duty);
+        let counts_of = |plant: &Parameters| {
+            let from = State {
+                model: Model::new(plant),
+                starts: problem.first_starts(),
+                chi2: dot(&residual, &residual),
+                residual: residual.clone(),
+            };
+            let basis = problem.basis(&from.model, &from.starts, &from.residual);
+            likely(&problem, &basis, (&from, &[]), 1)
+        };
+        let found = counts_of(&real);
+        assert!(found.iter().any(|counts| (counts - 37.0).abs() < 0.3), "{found:?}");
     }
 }

@@ -1,5 +1,7 @@
 //! Noise of each channel, outliers, and what is left in a residual that noise would not leave.
 
+mod few;
+
 use crate::exact::Exact;
 use crate::median::median;
 use crate::problem::{Problem, dot};
@@ -47,14 +49,15 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             scatter(&shown, |triple| triple.iter().all(|v| *v != 0.0))
         };
         // the median: one noisy record must not hide what the others show
-        let typical = median((0..problem.records.len()).map(of)) * unsure(problem, n);
+        let typical = median((0..problem.records.len()).map(of)) * few::unsure(problem, n);
         let steps = problem.records.iter().map(|r| r.lattice[n].max(r.resolution[n]));
         let lattice = steps.fold(0.0, f64::max);
         let scale = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n];
         // step / sqrt 12: the standard deviation of rounding
         let least = (lattice / 12f64.sqrt())
             .max(least_share(problem) * scale)
-            .max(stuck(problem, n));
+            .max(stuck(problem, n))
+            .max(few::steps(problem, n));
         let has = problem
             .records
             .iter()
@@ -62,53 +65,12 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
         match (has, typical.is_finite()) {
             (false, _) => f64::INFINITY,
             (true, true) => (typical * problem.sigma[n])
-                .min(most(problem, n, scale))
+                .min(few::most(problem, n, scale))
                 .max(least)
                 .hypotenuse(metered(problem, n)),
-            // too few points to tell noise from anything: a share of what is measured, that of a good meter, or what is said of a poorer one
-            (true, false) => (2e-3 * scale).max(stated(problem, n)),
+            (true, false) => few::of_fewest(problem, residual, n, scale).max(least),
         }
     })
-}
-
-/// Most noise of settled points, as a share of the signal: poor meters have 0.5 %. The noise of a table is read off its rows, and
-/// without a bound rows in disorder would show themselves as noise.
-const POOR_METER: f64 = 5e-3;
-
-/// Noise that the plant file states for a channel; 0 if it states none.
-fn stated(problem: &Problem, n: usize) -> f64 {
-    let sensors = &problem.base.plant.sensors;
-    [&sensors.v_out, &sensors.i_l, &sensors.i_out, &sensors.v_in][n].noise
-}
-
-/// The most noise of a channel, of size `scale`.
-fn most(problem: &Problem, n: usize, scale: f64) -> f64 {
-    let mut records = problem
-        .records
-        .iter()
-        .filter(|r| r.measured[n].iter().any(|v| v.is_finite()));
-    match records.all(|record| record.settled && !record.repeated) {
-        // who states a larger noise has a poorer meter
-        true => (POOR_METER * scale).max(stated(problem, n)),
-        false => f64::INFINITY,
-    }
-}
-
-/// Fewer values than this show their noise so badly that a cause would be named by chance.
-const FEW: f64 = 50.0;
-
-/// How much more the noise of few values may be than it shows: its standard error is 1.6 / sqrt n (second differences).
-fn unsure(problem: &Problem, n: usize) -> f64 {
-    let records = problem.records.iter().filter(|record| !record.repeated);
-    let count = records
-        .flat_map(|record| &record.measured[n])
-        .filter(|v| v.is_finite())
-        .count() as f64;
-    if count > 0.0 && count < FEW {
-        1.0 + 1.6 / count.sqrt()
-    } else {
-        1.0
-    }
 }
 
 /// The least noise, as a share of the signal. A row a period is sampled with 13 bits at best (1e-4), and two simulators of
@@ -179,11 +141,19 @@ pub(crate) fn scatter(values: &[f64], counts: impl Fn(&[f64]) -> bool) -> f64 {
 /// together say no more than one. The standard deviation that gives them that weight; 0 for any other channel.
 fn stuck(problem: &Problem, n: usize) -> f64 {
     let (mut pairs, mut equal, mut gap) = (0, 0, f64::INFINITY);
-    for record in problem.records.iter().filter(|record| !record.settled) {
-        for pair in record.measured[n]
-            .windows(2)
-            .filter(|pair| pair.iter().all(|v| v.is_finite()))
-        {
+    for record in problem.records.iter().filter(|record| !record.repeated) {
+        let shown: Vec<f64> = record.measured[n].iter().copied().filter(|v| v.is_finite()).collect();
+        if record.settled {
+            // a meter that shows one value for all points tells the step that the file states, or its last digit
+            let is_one = shown.windows(2).all(|pair| pair[0] == pair[1]);
+            gap = gap.min(if is_one {
+                few::digit(problem, record, n)
+            } else {
+                f64::INFINITY
+            });
+        }
+        let whole = record.measured[n].windows(2);
+        for pair in whole.filter(|pair| pair.iter().all(|v| v.is_finite())) {
             pairs += 1;
             match (pair[1] - pair[0]).abs() {
                 0.0 => equal += 1,

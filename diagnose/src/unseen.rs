@@ -1,8 +1,10 @@
 //! Causes that these records would show only if they were larger than usual.
 
 use crate::attribute::Attribution;
+use crate::causes::Candidate;
 use crate::findings::Hidden;
 use crate::problem::Problem;
+use crate::record::CHANNELS;
 
 /// Each with the smallest change that would be seen.
 pub fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
@@ -13,7 +15,7 @@ pub fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
         let knob = &candidate.form.knobs[0];
         let reach = candidate.reach();
         // what would be seen at a usual size is not worth a line
-        if smallest > candidate.large().min(reach) {
+        if smallest > candidate.large().min(reach) && is_there(problem, candidate) {
             list.push(Hidden {
                 id: candidate.cause.id,
                 parameter: knob.name,
@@ -24,4 +26,30 @@ pub fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
         }
     }
     list
+}
+
+/// The sensors of the channels, as the plant names them.
+const SENSORS: [&str; CHANNELS] = ["sensors.v_out.", "sensors.i_l.", "sensors.i_out.", "sensors.v_in."];
+
+/// Whether the records have the load or the channel that a cause changes: an error of a load that nobody connected, or of a meter that
+/// nobody read, is not hidden in them.
+fn is_there(problem: &Problem, candidate: &Candidate) -> bool {
+    let loads = || problem.records.iter().flat_map(|record| &record.load);
+    let is_of_something = |key: &&str| match *key {
+        "load.cpl_time_constant" | "load.v_fold" => loads().any(|load| load.power != 0.0),
+        "load.setting_gain" => loads().any(|load| load.current != 0.0 || load.power != 0.0),
+        "load.resistor_gain" => loads().any(|load| load.conductance != 0.0),
+        key => SENSORS
+            .iter()
+            .position(|sensor| key.starts_with(sensor))
+            .is_none_or(|channel| {
+                problem.records.iter().any(|record| match &record.capture {
+                    Some(capture) => capture.mean(channel).is_some(),
+                    None => record.measured[channel].iter().any(|v| v.is_finite()),
+                })
+            }),
+    };
+    // the sampling instant has no key, and every record has one
+    let keys = candidate.form.knobs[0].keys;
+    keys.is_empty() || keys.iter().any(is_of_something)
 }

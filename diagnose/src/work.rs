@@ -49,12 +49,21 @@ impl Work {
         goes_on
     }
 
+    /// Whether half of it is left, for what is tried where two searches have failed; what may not begin is remembered.
+    pub(crate) fn half_is_left(&self) -> bool {
+        let is_left = 2 * self.0.rows.load(Ordering::Relaxed) < ROWS;
+        if !is_left {
+            self.0.was_cut.store(true, Ordering::Relaxed);
+        }
+        is_left
+    }
+
     /// What is said where something was not begun.
     #[must_use]
     pub(crate) fn said(&self) -> Option<String> {
         self.0.was_cut.load(Ordering::Relaxed).then(|| {
             format!(
-                "the search ended at its budget of {} million simulated rows, and what it had found by then is shown: larger sets of causes, and \
+                "the search kept to its budget of {} million simulated rows, and what it had found by then is shown: larger sets of causes, and \
                  records without one channel, were not all tried",
                 ROWS / 1_000_000
             )
@@ -75,6 +84,7 @@ mod tests {
         shared.count(1);
         // nobody has asked for more
         assert_eq!(work.said(), None);
+        assert!(!work.half_is_left());
         assert!(!work.goes_on());
         assert!(shared.said().is_some_and(|said| said.contains("24 million")));
     }

@@ -111,8 +111,25 @@ fn a_coarse_step_is_named_and_stands_in_the_extended_model() {
 fn nothing_is_called_visible_beyond_its_reach() {
     let found = diagnosed(&model(), 0.1, 3);
     let list = &found.findings.not_detectable;
-    assert!(list.iter().any(|hidden| hidden.smallest.is_none()), "{list:?}");
+    assert!(!list.is_empty());
     for hidden in list {
         assert!(hidden.smallest.is_none_or(|size| size <= hidden.reach), "{hidden:?}");
+    }
+}
+
+#[test]
+fn nothing_is_called_hidden_of_loads_and_meters_that_are_not_there() {
+    // a resistor alone, and no meter of load current or source voltage
+    let found = diagnosed(&model(), 0.1, 3);
+    let list = &found.findings.not_detectable;
+    for hidden in list {
+        let names = ["cpl_bandwidth", "cpl_fold", "v_in_gain"];
+        assert!(!names.contains(&hidden.id), "{hidden:?}");
+        let of_load_current = ["gain_o", "offset_o", "delay_o", "time_constant_o"];
+        assert!(!of_load_current.contains(&hidden.parameter), "{hidden:?}");
+        assert!(
+            hidden.id != "load_gain" || hidden.parameter == "resistor_gain",
+            "{hidden:?}"
+        );
     }
 }

@@ -150,9 +150,10 @@ impl Searcher<'_> {
             return (None, Vec::new());
         };
         let mut best = self.polished(first);
+        let mut before = null.chi2;
         while best.causes.len() < MOST
             && best.values.len() < most
-            && !self.is_hopeless(&best)
+            && !self.is_hopeless(&best, before)
             && !self.is_out_of_reach(&best)
             && self.fitter.problem.work.goes_on()
         {
@@ -174,6 +175,7 @@ impl Searcher<'_> {
             let of_edges = || larger.iter().find(|fit| self.stands_for_edges(&best.state, fit));
             let first = larger.first().filter(|fit| self.is_worth(&best, fit));
             let Some(next) = first.or_else(of_edges) else { break };
+            before = best.state.chi2;
             best = self.polished(next);
             // where the edges have to do more than they can, it is another cause as well
             if self.structure(&best) > 0.0 || self.asks_for_edges(&best.state) {

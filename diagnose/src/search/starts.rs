@@ -49,15 +49,19 @@ impl Searcher<'_> {
             let own = self.fitter.candidates[cause].own.clone();
             return vec![(from.chi2 - gained(&columns, &from.residual), own)];
         }
-        let looks = self.starts(cause, from).into_iter().enumerate().map(|(place, start)| {
-            let state = self.fitter.state_at(&[cause], &start, from, 0).0;
-            // the initial states and the others may have to follow before it shows what it is worth
-            let mut left = state.residual.clone();
-            self.fitter.basis.project(&mut left);
-            let mut columns = set.columns.to_vec();
-            columns.extend(self.tangents(cause, place, &state).iter().cloned());
-            (dot(&left, &left) - gained(&columns, &left), start)
-        });
+        let looks = self
+            .starts(cause, from, set.columns)
+            .into_iter()
+            .enumerate()
+            .map(|(place, start)| {
+                let state = self.fitter.state_at(&[cause], &start, from, 0).0;
+                // the initial states and the others may have to follow before it shows what it is worth
+                let mut left = state.residual.clone();
+                self.fitter.basis.project(&mut left);
+                let mut columns = set.columns.to_vec();
+                columns.extend(self.tangents(cause, place, &state).iter().cloned());
+                (dot(&left, &left) - gained(&columns, &left), start)
+            });
         let mut looks: Vec<_> = looks.collect();
         looks.sort_by(|a, b| a.0.total_cmp(&b.0));
         match (looks.first(), self.search(cause)) {
@@ -110,7 +114,7 @@ impl Searcher<'_> {
     }
 
     /// Where the fit of a candidate may begin; what the residual itself tells is read off it.
-    pub(super) fn starts(&self, cause: usize, from: &State) -> Vec<Vec<f64>> {
+    pub(super) fn starts(&self, cause: usize, from: &State, beside: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let (problem, residual) = (self.fitter.problem, &from.residual);
         match self.search(cause) {
             Search::Line => {
@@ -121,7 +125,7 @@ impl Searcher<'_> {
                 })]
             }
             Search::Counter => {
-                let counts = duty_steps::likely(problem, self.fitter.basis, residual, COUNTS);
+                let counts = duty_steps::likely(problem, self.fitter.basis, (from, beside), COUNTS);
                 counts.into_iter().map(|counts| vec![counts.recip()]).collect()
             }
             _ => self.fitter.starts(cause),

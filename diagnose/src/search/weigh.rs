@@ -13,6 +13,11 @@ use crate::shape::structures;
 const HOPELESS: f64 = 10.0;
 const STILL_THERE: f64 = 0.1;
 
+/// It ends as well where the last cause left this share of the squares, and this mean square over that of the noise, ten times it in size:
+/// of two causes the second takes nearly all that the first has left, and one that only imitates what is left takes about half of it.
+const ADDED_LITTLE: f64 = 0.3;
+const FAR_OFF: f64 = 100.0;
+
 /// A search ends where all candidates together, as many as there are, leave this share of the squares at first order, and this mean square
 /// over that of the noise: two more causes do not what forty cannot. A cause whose response bends leaves less than half of it in its
 /// tangents at the starts.
@@ -68,12 +73,14 @@ impl Searcher<'_> {
             && (gain >= ACCURACY * ACCURACY * explained || self.structure(larger) < 0.5 * self.structure(smaller))
     }
 
-    /// Whether two causes and more leave most of the error: a third repairs no such thing, and each costs as long as all before.
-    pub(super) fn is_hopeless(&self, fit: &Fit) -> bool {
+    /// Whether two causes and more leave most of the error, or of what the causes before them left, which was `before`: a third repairs no
+    /// such thing, and each costs as long as all before.
+    pub(super) fn is_hopeless(&self, fit: &Fit, before: f64) -> bool {
         let count = self.fitter.problem.count().max(1) as f64;
-        fit.causes.len() > 1
-            && fit.state.chi2 > HOPELESS * count
-            && fit.state.chi2 > STILL_THERE * self.fitter.null.chi2
+        let leaves_much = fit.state.chi2 > HOPELESS * count && fit.state.chi2 > STILL_THERE * self.fitter.null.chi2;
+        // one large cause makes all that follows small beside the model as given
+        let adds_little = fit.state.chi2 > FAR_OFF * count && fit.state.chi2 > ADDED_LITTLE * before;
+        fit.causes.len() > 1 && (leaves_much || adds_little)
     }
 
     /// Whether all candidates together explain too little of what a fit leaves for any few of them to explain it.
@@ -97,7 +104,7 @@ impl Searcher<'_> {
             return self.fitter.sensitivity(cause, from);
         }
         let each = self
-            .starts(cause, from)
+            .starts(cause, from, &[])
             .into_iter()
             .enumerate()
             .flat_map(|(place, start)| {

@@ -16,7 +16,7 @@ pub struct Results {
 }
 
 /// Caught, whether by a failing test or by a limit.
-const CAUGHT: [&str; 3] = ["failed", "hung", "grew"];
+const CAUGHT: [&str; 3] = ["failed", "looped", "grew"];
 
 impl Results {
     /// Those of an earlier run, if the file is there.

@@ -27,11 +27,12 @@ use results::Results;
 use run::{End, Switched};
 
 const USAGE: &str = "\
-usage: cargo xtask mutants --seed S [--sample N] [--again] [--table]
+usage: cargo xtask mutants --seed S [--sample N] [--again [--with P]] [--table]
 
   --seed S     which mutants are drawn
   --sample N   so many of each of interp, policy and codegen (50)
   --again      those that no test caught once more: a test may be new
+  --with P     only by the tests whose program begins so, as `policy/bad_values`; what they do not catch stays as it was
   --table      only what is known, nothing is run
 
 Results are in target/mutants/S.jsonl; a run that was stopped goes on. What changes nothing is listed in tools/mutants/equal.md.
@@ -50,6 +51,7 @@ struct Options {
     seed: u64,
     sample: usize,
     again: bool,
+    with: String,
     table: bool,
 }
 
@@ -82,20 +84,24 @@ fn parse(arguments: &[String]) -> Result<Options, String> {
     let mut seed = None;
     let mut words = arguments.iter();
     while let Some(word) = words.next() {
-        let mut number = || {
+        let number = |words: &mut std::slice::Iter<'_, String>| {
             let text = words.next().ok_or_else(|| format!("`{word}` takes a number"))?;
             text.parse::<u64>()
                 .map_err(|_| format!("`{word}` takes a number, found `{text}`"))
         };
         match word.as_str() {
-            "--seed" => seed = Some(number()?),
-            "--sample" => options.sample = usize::try_from(number()?).unwrap_or(usize::MAX),
+            "--seed" => seed = Some(number(&mut words)?),
+            "--sample" => options.sample = usize::try_from(number(&mut words)?).unwrap_or(usize::MAX),
             "--again" => options.again = true,
+            "--with" => options.with = words.next().ok_or("`--with` takes the name of a program")?.clone(),
             "--table" => options.table = true,
             _ => return Err(format!("unknown option `{word}`")),
         }
     }
     options.seed = seed.ok_or("`--seed` is missing")?;
+    if !options.with.is_empty() && !options.again {
+        return Err("`--with` comes with `--again`: a new mutant is for all tests".into());
+    }
     Ok(options)
 }
 
@@ -136,9 +142,17 @@ fn work(options: &Options, folders: &Folders) -> Result<String, String> {
         population.macros
     ));
     if options.table {
-        return Ok(results.table(&sample(&population, &results, options.sample), &equal));
+        return Ok(results.table(
+            &sample(&population, &results, options.sample),
+            &draw::names(&population),
+            &equal,
+        ));
     }
     let (built, tests) = build(options, folders, &population, &mut results)?;
+    let tests: Vec<Test> = tests
+        .into_iter()
+        .filter(|test| test.program.starts_with(&options.with))
+        .collect();
     let asked = measured(&tests, folders, built.len())?;
     let sample = sample(&population, &results, options.sample);
     for key in sample.iter().map(Drawn::key) {
@@ -150,10 +164,14 @@ fn work(options: &Options, folders: &Folders) -> Result<String, String> {
             other => other.is_some(),
         };
         if !is_known {
-            try_one(number, &key, &asked, &mut results)?;
+            let (end, by, seconds) = try_one(number, &asked)?;
+            say(&format!("{end}: {key} {by} ({seconds:.1} s)"));
+            if options.with.is_empty() || results::is_caught(end) {
+                results.add(&key, end, &by, seconds)?;
+            }
         }
     }
-    Ok(results.table(&sample, &equal))
+    Ok(results.table(&sample, &draw::names(&population), &equal))
 }
 
 /// The first of each crate in the order of the seed, without those that do not compile.
@@ -202,7 +220,7 @@ struct Asked {
 
 /// Runs each test without a mutant. The quickest comes first.
 fn measured(tests: &[Test], folders: &Folders, count: usize) -> Result<Vec<Asked>, String> {
-    let file = folders.out.join("asked");
+    let file = folders.out.join(format!("asked-{}", std::process::id()));
     let mut all = Vec::new();
     for test in tests {
         let _ = std::fs::remove_file(&file);
@@ -227,6 +245,7 @@ fn measured(tests: &[Test], folders: &Folders, count: usize) -> Result<Vec<Asked
             mutants,
         });
     }
+    let _ = std::fs::remove_file(&file);
     let total: Duration = all.iter().map(|asked| asked.seconds).sum();
     say(&format!(
         "{} tests pass without a mutant, in {:.0} s",
@@ -237,7 +256,8 @@ fn measured(tests: &[Test], folders: &Folders, count: usize) -> Result<Vec<Asked
     Ok(all)
 }
 
-fn try_one(number: usize, key: &str, tests: &[Asked], results: &mut Results) -> Result<(), String> {
+/// How it ended, by which test, and after how many seconds.
+fn try_one(number: usize, tests: &[Asked]) -> Result<(&'static str, String, f64), String> {
     let mut total = 0.0;
     let mut last = ("not reached", String::new());
     for asked in tests.iter().filter(|asked| asked.mutants.contains(&number)) {
@@ -258,8 +278,7 @@ fn try_one(number: usize, key: &str, tests: &[Asked], results: &mut Results) -> 
             break;
         }
     }
-    say(&format!("{}: {key} {} ({total:.1} s)", last.0, last.1));
-    results.add(key, last.0, &last.1, total)
+    Ok((last.0, last.1, total))
 }
 
 /// Without the mutant the test has to pass again, or it was the machine and not the mutant that failed it.
@@ -290,6 +309,15 @@ mod tests {
         assert!(parse(&words("--sample 3")).unwrap_err().contains("--seed"));
         assert!(parse(&words("--seed x")).unwrap_err().contains("`x`"));
         assert!(parse(&words("--sede 1")).unwrap_err().contains("`--sede`"));
+        assert_eq!(
+            parse(&words("--seed 7 --again --with policy/")).unwrap().with,
+            "policy/"
+        );
+        assert!(
+            parse(&words("--seed 7 --with policy/"))
+                .unwrap_err()
+                .contains("--again")
+        );
     }
 
     /// The same seed draws the same mutants, another one others; and there are thousands to draw from.

@@ -148,6 +148,8 @@ impl Build<'_> {
                 continue;
             }
             let path = kept.join(Path::new(built).file_name().unwrap_or_default());
+            // a run beside this one may have it open: that one keeps what it began with
+            let _ = std::fs::remove_file(&path);
             std::fs::copy(built, &path).map_err(|error| at(&path, error))?;
             let program = match is_lib {
                 true => format!("{krate} (units)"),

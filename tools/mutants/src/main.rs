@@ -32,7 +32,7 @@ usage: cargo xtask mutants --seed S [--sample N] [--again [--with P]] [--table]
   --seed S     which mutants are drawn
   --sample N   so many of each of interp, policy and codegen (50)
   --again      those that no test caught once more: a test may be new
-  --with P     only by the tests whose program begins so, as `policy/bad_values`; what they do not catch stays as it was
+  --with P     only by the tests that begin so, as `policy/` or `policy/chains: a_row`; what they do not catch stays as it was
   --table      only what is known, nothing is run
 
 Results are in target/mutants/S.jsonl; a run that was stopped goes on. What changes nothing is listed in tools/mutants/equal.md.
@@ -151,7 +151,7 @@ fn work(options: &Options, folders: &Folders) -> Result<String, String> {
     let (built, tests) = build(options, folders, &population, &mut results)?;
     let tests: Vec<Test> = tests
         .into_iter()
-        .filter(|test| test.program.starts_with(&options.with))
+        .filter(|test| test.label().starts_with(&options.with))
         .collect();
     let asked = measured(&tests, folders, built.len())?;
     let sample = sample(&population, &results, options.sample);

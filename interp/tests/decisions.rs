@@ -69,6 +69,14 @@ fn changed_decisions_are_weighed_by_what_they_give_up() {
 }
 
 #[test]
+fn one_vector_is_weighed_by_its_own_range() {
+    // 2 of a range of 2 is given up: the trainer takes 7 where the network takes 5
+    let found = choices(&chooser(golden(&[4.0], &[5.0, 7.0], &[1])), None);
+    assert_eq!((found.observations, found.changed, found.operating_range), (1, 1, 2.0));
+    assert_eq!((found.largest_loss, found.mean_loss), (1.0, 1.0));
+}
+
+#[test]
 fn the_share_that_may_change_is_the_contracts_or_the_one_given() {
     let found = choices(&chooser(five()), None);
     assert!(!found.kept() && found.allowed == 0.0, "a real format changes none");

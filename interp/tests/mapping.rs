@@ -43,6 +43,7 @@ fn three_term_mapping_uses_the_duty_and_the_load_current() {
     let trace = c.step(&[Physical(9.0), Physical(2.0)]).unwrap();
     // 0.5 * 0.75 + 0.0625 * 2 + 0.125
     assert_eq!((trace.command.duty_sim, trace.command.duty), (0.75, 0.625));
+    assert_eq!((trace.mapped, trace.decision(0).mapped), (0.625, 0.625));
     assert_eq!(trace.command.status, status::PRIMED);
 }
 

@@ -60,6 +60,14 @@ fn a_decimal_comma_is_explained() {
         &["not valid TOML", "write 1.5 instead of 1,5"],
     );
     contract_fault("[0.40, 0.60]", "¦[0,40, 0,60]", &["4", "two numbers", "decimal comma"]);
+    let duties = "[0.44, 0.50, 0.56]";
+    contract_fault(duties, "¦[0,10, 0,15]", &["decimal commas", "write 0.10, 0.15"]);
+    // one duty too large among others is no list of commas
+    let said = Folder::new().replace(duties, "[0.1, 3, 0.2, 0.4]").faults().to_string();
+    assert!(
+        said.contains("not a duty ratio") && !said.contains("decimal comma"),
+        "{said}"
+    );
     contract_fault(
         "scale = 0.2",
         "scale = ¦\"1,5\"",

@@ -118,7 +118,7 @@ fn limits_slew_and_soft_start_must_work_in_f32() {
     contract_fault(
         "initial_duty = 0.5",
         "soft_start = { from = ¦0.7, steps = 10 }",
-        &["`from` lies outside", "0.7"],
+        &["`from` lies outside", "0.7", " | 0 to 0.6"],
     );
     contract_fault(
         "initial_duty = 0.5",
@@ -194,6 +194,17 @@ fn adc_codes_must_be_able_to_say_the_range() {
         &with("{ gain = 0.005, offset = 0.0, bits = ¦12 }"),
         &["end of its codes", "20.475", "far inside of the range", "divider"],
     );
+    // 255 V; a range with half as much room is still that of this divider, and one with more is not
+    for (end, says) in [
+        ("382.5", "let the range end at 254"),
+        ("383.0", "far inside of the range"),
+    ] {
+        let faults = Folder::new()
+            .replace("[0.0, 250.0]", &format!("[0.0, {end}]"))
+            .replace(unit, &with("{ gain = 1.0, offset = 0.0, bits = 8 }"))
+            .faults();
+        assert_says(&faults.faults.list[0], &["255 at that code", says]);
+    }
     // code 0 is -0.5 A where -1 A is plausible, and the last code, 40.45 A, is not
     contract_fault(
         "unit = \"A\"",
@@ -263,7 +274,7 @@ fn filters_are_checked_one_by_one() {
     contract_fault(
         one,
         &with("{ low_pass = ¦{} }"),
-        &["exactly one of time_constant, cutoff"],
+        &["exactly one of time_constant, cutoff | 0 | 1"],
     );
     contract_fault(one, &with("{ low_pass = { cutoff = ¦0 } }"), &["greater than 0"]);
     contract_fault(one, &with("{ integrator = ¦{ min = 1.0, max = -1.0 } }"), &["crossed"]);

@@ -162,6 +162,9 @@ fn a_wrong_number_of_inputs_or_outputs_is_explained() {
     );
     let fault = weights_fault(&[dense("net.0", 4, 2), dense("net.2", 3, 5)].concat());
     assert_tensor(&fault, FILE, "net.2.weight", &["shape [3, 5]", "shape [3, 4]"]);
+    // the other way round the first layer takes 2 inputs, too, but then gives 4 to a layer that takes 5
+    let fault = weights_fault(&[dense("net.0", 2, 4), dense("net.2", 3, 5)].concat());
+    assert_tensor(&fault, FILE, "net.0.weight", &["shape [2, 4]", "shape [2, 2]"]);
     let fault = weights_fault(&replaced(tensor("net.2.bias", &[4])));
     assert_tensor(
         &fault,
@@ -176,6 +179,13 @@ fn a_convolution_is_refused() {
     let fault = weights_fault(&replaced(tensor("net.0.weight", &[4, 2, 1])));
     // its bias then stands alone
     assert_says(&fault, &["net.0.weight"]);
+    let tensors = [tensor("net.0.weight", &[4, 2, 1]), tensor("net.2.weight", &[3, 4])];
+    assert_tensor(
+        &weights_fault(&tensors),
+        FILE,
+        "net.0.weight",
+        &["shape [4, 2, 1]", "two axes: [out, in]"],
+    );
 }
 
 #[test]
@@ -297,6 +307,8 @@ fn odd_tensor_names_are_refused() {
 fn files_of_other_kinds_get_a_hint_how_to_export() {
     file_fault(b"PK\x03\x04 and so on and on", &["zip archive", "policyc new"]);
     file_fault(b"\x80\x04\x95 and so on", &["pickle", "never opened", "save_file"]);
+    // protocol 1 has no mark, so this is none
+    file_fault(b"\x80\x01\x95 and so on", &["a header of", "bytes, more than"]);
     file_fault(b"\x89HDF\r\n\x1a\n and so on", &["HDF5"]);
     file_fault(
         b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n",

@@ -266,6 +266,20 @@ fn more_than_nine_layers_are_refused() {
 }
 
 #[test]
+fn a_row_of_more_than_nine_layers_is_no_rival_of_one_that_fits() {
+    let sizes = |i: usize| (if i == 9 { 3 } else { 4 }, if i == 0 { 2 } else { 4 });
+    let deep = (0..10).flat_map(|i| dense(&format!("deep.{i}"), sizes(i).0, sizes(i).1));
+    let tensors: Vec<_> = deep.chain(dense("flat.0", 4, 2)).chain(dense("flat.1", 3, 4)).collect();
+    let policy = Folder::new().tensors(&tensors).policy();
+    assert_eq!(policy.layers.len(), 2);
+    assert!(
+        policy.notes.join("\n").contains("left unused: deep.0"),
+        "{:?}",
+        policy.notes
+    );
+}
+
+#[test]
 fn a_layer_wider_than_1024_is_refused() {
     let tensors = all(&[("net.0", 1025, 2), ("net.2", 3, 1025)]);
     assert_says(

@@ -48,10 +48,10 @@ fn observations_that_the_controller_cannot_see_are_refused_with_their_share() {
         "{told}"
     );
     // with none left there is nothing that could be allowed
-    let all = f32_tensor("obs", &[2, 2], &[21.0, 5.0, 21.0, 0.0]);
+    let all = f32_tensor("obs", &[2, 2], &[22.0, 5.0, 21.0, 0.0]);
     let told = fault(&[all, q.clone()]).to_string();
     assert!(
-        told.contains("all 2 rows lie outside") && !told.contains("golden_outside"),
+        told.contains("all 2 rows lie outside") && told.contains("row 0") && !told.contains("golden_outside"),
         "{told}"
     );
 }

@@ -170,6 +170,11 @@ fn faults_of_an_observer_say_what_it_wants() {
     refused(faulty("bias = [-8.0, 4.0]", "bias = [1.0, 4.0]"), &["bias", "0 in it"]);
     refused(faulty("current = [0.0, 60.0]", "current = [60.0, 0.0]"), &["current"]);
     refused(faulty("name = \"model\"", "name = \"i\"\nnome = 1"), &["nome"]);
+    let (one, _) = OBSERVER.split_once("\n\n[[feature]]").unwrap();
+    let five: String = (0..5)
+        .map(|number| one.replace("model", &format!("model_{number}")) + "\n")
+        .collect();
+    refused(faulty(one, &five), &["too many observers", "5", "0 to 4"]);
 }
 
 #[test]

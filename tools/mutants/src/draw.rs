@@ -1,5 +1,6 @@
 //! All mutants of the three crates, in an order that a seed draws.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use random::{Random, SplitMix};
@@ -26,6 +27,30 @@ impl Drawn {
         let (line, column) = self.mutant.place;
         format!("{}:{line}:{column}: {}", self.file.display(), self.mutant.text)
     }
+}
+
+/// The name of each mutant in the list of those that change nothing, by its [`Drawn::key`]: file and change without the line,
+/// which edits elsewhere move. Equal changes in a file are counted, `#2` the second: a reason stands for one place alone.
+pub fn names(population: &Population) -> BTreeMap<String, String> {
+    let mut alike: BTreeMap<String, Vec<&Drawn>> = BTreeMap::new();
+    for drawn in population.mutants.iter().flatten() {
+        let name = format!("{}: {}", drawn.file.display(), drawn.mutant.text);
+        alike.entry(name).or_default().push(drawn);
+    }
+    let mut names = BTreeMap::new();
+    for (name, mut all) in alike {
+        all.sort_by_key(|drawn| drawn.mutant.place);
+        let is_one = all.len() == 1;
+        names.extend(all.iter().enumerate().map(|(at, drawn)| {
+            let own = if is_one {
+                name.clone()
+            } else {
+                format!("{name} #{}", at + 1)
+            };
+            (drawn.key(), own)
+        }));
+    }
+    names
 }
 
 /// What the crates hold.
@@ -82,4 +107,30 @@ fn sources(folder: &Path) -> Result<Vec<PathBuf>, String> {
         }
     }
     Ok(files)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_changes_in_a_file_have_names_of_their_own_wherever_their_lines_go() {
+        let names_of = |text: &str| {
+            let mutants = sites::find(text).unwrap().mutants.into_iter().rev();
+            let drawn = mutants.map(|mutant| Drawn {
+                krate: "interp",
+                file: "a.rs".into(),
+                mutant,
+            });
+            let population = Population {
+                mutants: vec![drawn.collect()],
+                ..Population::default()
+            };
+            names(&population)
+        };
+        let names = names_of("fn f() -> &X {\n g(!a, 7);\n g(b, 7) }");
+        assert_eq!(names["a.rs:2:4: no ! in `!a`"], "a.rs: no ! in `!a`");
+        assert_eq!(names["a.rs:2:8: 7 becomes 8"], "a.rs: 7 becomes 8 #1");
+        assert_eq!(names["a.rs:3:7: 7 becomes 8"], "a.rs: 7 becomes 8 #2");
+    }
 }

@@ -1,8 +1,8 @@
 //! Changes to interp, policy and codegen, and whether a test notices.
 //!
 //! ```text
-//! sources ─► draw by a seed ─► one copy of the workspace, each mutant behind a switch ─► one build ─► each program, no
-//! mutant on: which switches are asked ─► each mutant: the programs that ask it, the quickest first, until one fails
+//! sources ─► draw by a seed ─► one copy of the workspace, each mutant behind a switch ─► one build ─► each test, no
+//! mutant on: which switches each test asks ─► each mutant: the tests that ask it, the quickest first, until one fails
 //! ```
 //!
 //! A tool that builds anew for each mutant takes a minute or more for each, on two cores.
@@ -22,25 +22,28 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use draw::{Drawn, Population};
-use programs::{Build, Built, Program};
+use programs::{Build, Built, Test};
 use results::Results;
 use run::{End, Switched};
 
 const USAGE: &str = "\
-usage: cargo xtask mutants --seed S [--sample N] [--again] [--table]
+usage: cargo xtask mutants --seed S [--sample N] [--again [--with P]] [--table]
 
   --seed S     which mutants are drawn
   --sample N   so many of each of interp, policy and codegen (50)
   --again      those that no test caught once more: a test may be new
+  --with P     only by the tests that begin so, as `policy/` or `policy/chains: a_row`; what they do not catch stays as it was
   --table      only what is known, nothing is run
 
 Results are in target/mutants/S.jsonl; a run that was stopped goes on. What changes nothing is listed in tools/mutants/equal.md.
 ";
 
-/// A program may take this many times as long as without a mutant, and [`GRACE`] beside it: the machine may be busy.
+/// A test may compute this many times as long as without a mutant, and [`GRACE`] beside it.
 const PATIENCE: u32 = 10;
-const GRACE: Duration = Duration::from_secs(30);
-/// A program that takes longer than this without a mutant does not end.
+const GRACE: Duration = Duration::from_secs(10);
+/// Tests that take longer than this are named.
+const TOLD: Duration = Duration::from_secs(2);
+/// A test that computes longer than this without a mutant does not end.
 const LONGEST: Duration = Duration::from_secs(900);
 
 #[derive(Debug, Default)]
@@ -48,6 +51,7 @@ struct Options {
     seed: u64,
     sample: usize,
     again: bool,
+    with: String,
     table: bool,
 }
 
@@ -80,20 +84,24 @@ fn parse(arguments: &[String]) -> Result<Options, String> {
     let mut seed = None;
     let mut words = arguments.iter();
     while let Some(word) = words.next() {
-        let mut number = || {
+        let number = |words: &mut std::slice::Iter<'_, String>| {
             let text = words.next().ok_or_else(|| format!("`{word}` takes a number"))?;
             text.parse::<u64>()
                 .map_err(|_| format!("`{word}` takes a number, found `{text}`"))
         };
         match word.as_str() {
-            "--seed" => seed = Some(number()?),
-            "--sample" => options.sample = usize::try_from(number()?).unwrap_or(usize::MAX),
+            "--seed" => seed = Some(number(&mut words)?),
+            "--sample" => options.sample = usize::try_from(number(&mut words)?).unwrap_or(usize::MAX),
             "--again" => options.again = true,
+            "--with" => options.with = words.next().ok_or("`--with` takes the name of a program")?.clone(),
             "--table" => options.table = true,
             _ => return Err(format!("unknown option `{word}`")),
         }
     }
     options.seed = seed.ok_or("`--seed` is missing")?;
+    if !options.with.is_empty() && !options.again {
+        return Err("`--with` comes with `--again`: a new mutant is for all tests".into());
+    }
     Ok(options)
 }
 
@@ -134,24 +142,36 @@ fn work(options: &Options, folders: &Folders) -> Result<String, String> {
         population.macros
     ));
     if options.table {
-        return Ok(results.table(&sample(&population, &results, options.sample), &equal));
+        return Ok(results.table(
+            &sample(&population, &results, options.sample),
+            &draw::names(&population),
+            &equal,
+        ));
     }
-    let (built, programs) = build(options, folders, &population, &mut results)?;
-    let asked = measured(&programs, folders, built.len())?;
+    let (built, tests) = build(options, folders, &population, &mut results)?;
+    let tests: Vec<Test> = tests
+        .into_iter()
+        .filter(|test| test.label().starts_with(&options.with))
+        .collect();
+    let asked = measured(&tests, folders, built.len())?;
     let sample = sample(&population, &results, options.sample);
     for key in sample.iter().map(Drawn::key) {
         let Some(number) = built.iter().position(|drawn| drawn.key() == key) else {
             return Err(format!("{key} was not built"));
         };
         let is_known = match results.of(&key) {
-            Some("passed" | "not reached") => !options.again,
+            Some("passed" | "not reached" | "stuck") => !options.again,
             other => other.is_some(),
         };
         if !is_known {
-            try_one(number, &key, &asked, &mut results)?;
+            let (end, by, seconds) = try_one(number, &asked)?;
+            say(&format!("{end}: {key} {by} ({seconds:.1} s)"));
+            if options.with.is_empty() || results::is_caught(end) {
+                results.add(&key, end, &by, seconds)?;
+            }
         }
     }
-    Ok(results.table(&sample, &equal))
+    Ok(results.table(&sample, &draw::names(&population), &equal))
 }
 
 /// The first of each crate in the order of the seed, without those that do not compile.
@@ -170,7 +190,7 @@ fn build(
     folders: &Folders,
     population: &Population,
     results: &mut Results,
-) -> Result<(Vec<Drawn>, Vec<Program>), String> {
+) -> Result<(Vec<Drawn>, Vec<Test>), String> {
     let spare = options.sample / 3 + 5;
     loop {
         let mutants = sample(population, results, options.sample + spare);
@@ -179,8 +199,8 @@ fn build(
             root: &folders.copy,
             target: &folders.build,
         };
-        match cargo.programs(&placed)? {
-            Built::Programs(programs) => return Ok((mutants, programs)),
+        match cargo.tests(&placed, &folders.out.join("programs"))? {
+            Built::Tests(tests) => return Ok((mutants, tests)),
             Built::Without(bad) => {
                 say(&format!("{} of {} do not compile", bad.len(), mutants.len()));
                 for number in bad {
@@ -191,74 +211,85 @@ fn build(
     }
 }
 
-/// A program, how long it takes, and the mutants whose switch it asks.
+/// A test, how long it takes, and the mutants whose switch it asks.
 struct Asked {
-    program: Program,
+    test: Test,
     seconds: Duration,
     mutants: BTreeSet<usize>,
 }
 
-/// Runs each program without a mutant. The quickest comes first.
-fn measured(programs: &[Program], folders: &Folders, count: usize) -> Result<Vec<Asked>, String> {
-    let file = folders.out.join("asked");
-    let kept = folders.out.join("programs");
-    std::fs::create_dir_all(&kept).map_err(|error| format!("{}: {error}", kept.display()))?;
+/// Runs each test without a mutant. The quickest comes first.
+fn measured(tests: &[Test], folders: &Folders, count: usize) -> Result<Vec<Asked>, String> {
+    let file = folders.out.join(format!("asked-{}", std::process::id()));
     let mut all = Vec::new();
-    for program in programs {
-        // another build takes nothing away from a run that takes an hour
-        let path = kept.join(program.path.file_name().unwrap_or_default());
-        std::fs::copy(&program.path, &path).map_err(|error| format!("{}: {error}", path.display()))?;
-        let program = &Program {
-            path,
-            ..program.clone()
-        };
+    for test in tests {
         let _ = std::fs::remove_file(&file);
-        let (end, seconds) = run::run(program, Switched::Asked(&file), LONGEST)?;
+        let (end, seconds) = run::run(test, Switched::Asked(&file), LONGEST)?;
         let text = std::fs::read_to_string(&file).unwrap_or_default();
         let mutants: BTreeSet<usize> = text.lines().filter_map(|line| line.parse().ok()).collect();
         let reached = mutants.iter().filter(|number| **number < count).count();
-        say(&format!(
-            "{}: {:.1} s, {reached} mutants, {end:?}",
-            program.name,
-            seconds.as_secs_f64()
-        ));
+        if seconds > TOLD || end != End::Passed {
+            let seconds = seconds.as_secs_f64();
+            say(&format!("{}: {seconds:.1} s, {reached} mutants, {end:?}", test.label()));
+        }
         if end != End::Passed {
             return Err(format!(
-                "{} fails without a mutant: {} {}",
-                program.name,
-                program.path.display(),
-                program.arguments.join(" ")
+                "{} fails without a mutant: {}",
+                test.label(),
+                test.path.display()
             ));
         }
         all.push(Asked {
-            program: program.clone(),
+            test: test.clone(),
             seconds,
             mutants,
         });
     }
+    let _ = std::fs::remove_file(&file);
+    let total: Duration = all.iter().map(|asked| asked.seconds).sum();
+    say(&format!(
+        "{} tests pass without a mutant, in {:.0} s",
+        all.len(),
+        total.as_secs_f64()
+    ));
     all.sort_by_key(|asked| asked.seconds);
     Ok(all)
 }
 
-fn try_one(number: usize, key: &str, programs: &[Asked], results: &mut Results) -> Result<(), String> {
+/// How it ended, by which test, and after how many seconds.
+fn try_one(number: usize, tests: &[Asked]) -> Result<(&'static str, String, f64), String> {
     let mut total = 0.0;
-    let mut last = ("not reached", "");
-    for asked in programs.iter().filter(|asked| asked.mutants.contains(&number)) {
+    let mut last = ("not reached", String::new());
+    for asked in tests.iter().filter(|asked| asked.mutants.contains(&number)) {
         let limit = asked.seconds * PATIENCE + GRACE;
-        let (end, seconds) = run::run(&asked.program, Switched::On(number), limit)?;
+        let (end, seconds) = run::run(&asked.test, Switched::On(number), limit)?;
         total += seconds.as_secs_f64();
         last = match end {
-            End::Passed => ("passed", ""),
-            End::Failed => ("failed", asked.program.name.as_str()),
-            End::Hung => ("hung", asked.program.name.as_str()),
-            End::Grew => ("grew", asked.program.name.as_str()),
+            // one that stood still is no reason to leave out the others
+            End::Passed | End::Stuck if last.0 == "stuck" => last,
+            End::Passed => ("passed", String::new()),
+            End::Stuck => ("stuck", asked.test.label()),
+            End::Failed => ("failed", asked.test.label()),
+            End::Looped => ("looped", asked.test.label()),
+            End::Grew => ("grew", asked.test.label()),
         };
-        if end != End::Passed {
+        if matches!(end, End::Failed | End::Looped | End::Grew) {
+            still_passes(asked)?;
             break;
         }
     }
-    say(&format!("{}: {key} {} ({total:.1} s)", last.0, last.1));
-    results.add(key, last.0, last.1, total)
+    Ok((last.0, last.1, total))
+}
+
+/// Without the mutant the test has to pass again, or it was the machine and not the mutant that failed it.
+fn still_passes(asked: &Asked) -> Result<(), String> {
+    match run::run(&asked.test, Switched::Off, LONGEST)?.0 {
+        End::Passed => Ok(()),
+        end => Err(format!(
+            "{} passed without a mutant and now does not: {end:?}",
+            asked.test.label()
+        )),
+    }
 }
 
 /// Progress goes to standard error: the table alone is the result.
@@ -278,6 +309,15 @@ mod tests {
         assert!(parse(&words("--sample 3")).unwrap_err().contains("--seed"));
         assert!(parse(&words("--seed x")).unwrap_err().contains("`x`"));
         assert!(parse(&words("--sede 1")).unwrap_err().contains("`--sede`"));
+        assert_eq!(
+            parse(&words("--seed 7 --again --with policy/")).unwrap().with,
+            "policy/"
+        );
+        assert!(
+            parse(&words("--seed 7 --with policy/"))
+                .unwrap_err()
+                .contains("--again")
+        );
     }
 
     /// The same seed draws the same mutants, another one others; and there are thousands to draw from.

@@ -16,7 +16,12 @@ pub struct Results {
 }
 
 /// Caught, whether by a failing test or by a limit.
-const CAUGHT: [&str; 3] = ["failed", "hung", "grew"];
+const CAUGHT: [&str; 3] = ["failed", "looped", "grew"];
+
+/// Whether a mutant that ended so was caught.
+pub fn is_caught(result: &str) -> bool {
+    CAUGHT.contains(&result)
+}
 
 impl Results {
     /// Those of an earlier run, if the file is there.
@@ -59,8 +64,9 @@ impl Results {
         Ok(())
     }
 
-    /// Counts for each crate, and the mutants that no test caught; `equal` are those that a person judged to change nothing.
-    pub fn table(&self, sample: &[Drawn], equal: &BTreeSet<String>) -> String {
+    /// Counts for each crate, and the mutants that no test caught; `equal` are the
+    /// [names](crate::draw::names) of those that a person judged to change nothing.
+    pub fn table(&self, sample: &[Drawn], names: &BTreeMap<String, String>, equal: &BTreeSet<String>) -> String {
         let mut text = String::from(
             "| crate | mutants | caught | change nothing | missed | caught of those that change something |\n",
         );
@@ -71,8 +77,8 @@ impl Results {
             let (mut caught, mut same, mut missed) = (0, 0, 0);
             for key in own.iter().map(|drawn| drawn.key()) {
                 match self.of(&key) {
-                    Some(result) if CAUGHT.contains(&result) => caught += 1,
-                    Some(_) if equal.contains(&unplaced(&key)) => same += 1,
+                    Some(result) if is_caught(result) => caught += 1,
+                    Some(_) if names.get(&key).is_some_and(|name| equal.contains(name)) => same += 1,
                     Some(result) => {
                         missed += 1;
                         left.push_str(&format!("{result}: {key}\n"));
@@ -90,13 +96,6 @@ impl Results {
     }
 }
 
-/// A name without line and column, which edits elsewhere move.
-fn unplaced(key: &str) -> String {
-    let mut parts = key.splitn(4, ':');
-    let file = parts.next().unwrap_or_default();
-    format!("{file}:{}", parts.nth(2).unwrap_or_default())
-}
-
 /// The list of those that change nothing: in each line that begins with `- ` a name in backticks, and why.
 pub fn judged(text: &str) -> BTreeSet<String> {
     let lines = text.lines().filter_map(|line| line.strip_prefix("- ``"));
@@ -110,8 +109,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_judged_mutant_is_known_wherever_its_line_went() {
+    fn the_list_is_read_by_name() {
         let list = judged("# x\n- ``a/b.rs: < becomes <= in `a::b < c` `` both ends are excluded before\n");
-        assert!(list.contains(&unplaced("a/b.rs:10:4: < becomes <= in `a::b < c`")));
+        assert_eq!(list.iter().collect::<Vec<_>>(), ["a/b.rs: < becomes <= in `a::b < c`"]);
     }
 }

@@ -1,0 +1,44 @@
+//! What is made of a network: its scales in integers, and smaller ones.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+use common::*;
+use policy::NumericFormat;
+
+/// Numeric contract, section 6b: the finest exponent is the largest e <= 24 with bound * 2^e <= 32767.
+#[test]
+fn no_observation_has_more_than_24_fractional_bits() {
+    let exponents = |clips: [f64; 2]| -> Vec<i32> {
+        let [first, second] = clips.map(|clip| format!("clip = [-{clip}, {clip}]"));
+        let policy = Folder::new()
+            .replace("clip = [-20.0, 20.0]", &first)
+            .replace(
+                "filters = [{ delay = 1 }]",
+                &format!("filters = [{{ delay = 1 }}]\n{second}"),
+            )
+            .policy()
+            .with_format(NumericFormat::I16);
+        let scales = policy::scales::of(&policy).unwrap();
+        scales.inputs.iter().map(|input| input.exponent).collect()
+    };
+    // 2^-10 would fit with 24 (and with no more), 2^-12 with 26
+    assert_eq!(exponents([0.000_976_562_5, 0.000_244_140_625]), [24, 24]);
+    // 1 fits with 14, and 14 + floor((24 - 14) / 2) is 19
+    assert_eq!(exponents([1.0, 0.000_244_140_625]), [14, 19]);
+}
+
+#[test]
+fn a_network_that_is_cut_keeps_its_inputs_and_its_outputs() {
+    let policy = Folder::new().policy();
+    assert_eq!(policy.widest_hidden(), 4);
+    let cut = policy.cut_to(2).unwrap();
+    let shapes: Vec<_> = cut.layers.iter().map(|layer| (layer.inputs, layer.outputs)).collect();
+    assert_eq!(shapes, [(2, 2), (2, 3)]);
+    let (before, after) = (&policy.layers[1], &cut.layers[1]);
+    let first_two: Vec<f32> = before
+        .weights
+        .chunks_exact(4)
+        .flat_map(|row| row[..2].to_vec())
+        .collect();
+    assert_eq!((&after.weights, &after.bias), (&first_two, &before.bias));
+}

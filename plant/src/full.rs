@@ -1,5 +1,5 @@
 //! The circuit with every effect between two switching edges, by Runge-Kutta steps of fourth order that are short
-//! against its fastest time constant.
+//! against its fastest time constant; a load cable among parts that do not change takes the matrix of [`affine`].
 //!
 //! Two voltages are algebraic. At the output `v_out = v_c + esr (i_b - i_out) + esl d(i_b - i_out)/dt`, at the input the
 //! source as seen from the switch, `v_th - r_th i`. `i_b` is the winding current, `i_l` that of the inductance itself;
@@ -16,6 +16,7 @@
 //! A part of this picture that a converter does not have keeps its state where it was, with slope 0. So do the low-passes of the
 //! sensors, which nothing here depends on: [`lag`] moves them on behind each step.
 
+mod affine;
 mod algebra;
 mod few;
 
@@ -87,6 +88,10 @@ pub(crate) struct Full {
     low_pass: [f64; 4],
     /// Fastest rate that does not depend on the load, in steps per second.
     rate: f64,
+    /// The sum of those rates, 1/s.
+    total: f64,
+    /// Whether a matrix takes it over a step.
+    is_affine: bool,
 }
 
 /// What follows from the states at once; the slopes are those of the first `N` states.
@@ -107,6 +112,7 @@ impl Full {
             (p.capacitor.derating == 0.0).then(|| 1.0 / p.converter.capacitance),
         ];
         let (has_cable, has_lag) = (p.cable.inductance > 0.0, p.load.cpl_time_constant > 0.0);
+        let is_affine = has_cable && linear.iter().all(Option::is_some) && p.source.ripple == 0.0;
         Full {
             p: p.clone(),
             linear,
@@ -117,6 +123,8 @@ impl Full {
             is_wired: has_cable && !has_lag && !has_c_in(p),
             low_pass,
             rate: rate::fastest(p).1,
+            total: rate::total(p),
+            is_affine,
         }
     }
 
@@ -163,6 +171,12 @@ impl Full {
     /// Advances by `h` seconds from time `t`, or until the current reaches 0 if the path stops there, or an open leg
     /// begins to conduct. Returns the time used.
     pub fn advance(&self, x: &mut States, path: &Path, load: &Load, span: (f64, f64), track: &mut Track) -> f64 {
+        if self.is_affine {
+            return match self.is_wired {
+                true => self.advance_affine::<WIRED>(x, path, load, span, track),
+                false => self.advance_affine::<SHOWN>(x, path, load, span, track),
+            };
+        }
         if let Some(few) = Few::new(self, path, load) {
             return match few.is_whole() {
                 true => self.advance_first(x, path, load, span, track, |x, _| few.algebra::<true>(x)),

@@ -17,20 +17,16 @@ pub(crate) fn has_c_in(p: &Parameters) -> bool {
     p.source.c_in > 0.0 && (p.source.resistance > 0.0 || p.source.inductance > 0.0)
 }
 
-/// Steps per second that the parts of the circuit ask for without a load, and the key of the part that asks for most.
-pub(crate) fn fastest(p: &Parameters) -> (&'static str, f64) {
+/// The rates of the parts of the circuit without a load: the key of the part, 1/s, and steps per time constant.
+fn rates(p: &Parameters, mut ask: impl FnMut(&'static str, f64, f64)) {
     // the least that saturation and derating can leave, so that the step need not follow current and voltage
     let l = p.converter.inductance * (1.0 - p.inductor.saturation);
     let c = p.converter.capacitance * (1.0 - p.capacitor.derating);
     let r = dcr::in_series(&p.inductor)
         + p.switch.r_ds_on.max(p.switch.r_ds_on_low).max(p.switch.r_d)
         + p.source.resistance;
-    let mut fastest = ("converter.inductance", 1.0 / (l * c).sqrt() / FILTER_STEP);
-    let mut ask = |key: &'static str, rate: f64| {
-        if rate / OTHER_STEP > fastest.1 {
-            fastest = (key, rate / OTHER_STEP);
-        }
-    };
+    ask("converter.inductance", 1.0 / (l * c).sqrt(), FILTER_STEP);
+    let mut ask = |key: &'static str, rate: f64| ask(key, rate, OTHER_STEP);
     ask("converter.inductance", (r + p.capacitor.esr) / l);
     // those of the sensors ask for nothing: `crate::lag`
     if p.load.cpl_time_constant > 0.0 {
@@ -61,7 +57,24 @@ pub(crate) fn fastest(p: &Parameters) -> (&'static str, f64) {
             p.source.ripple_frequency * std::f64::consts::TAU,
         );
     }
+}
+
+/// Steps per second that the parts of the circuit ask for without a load, and the key of the part that asks for most.
+pub(crate) fn fastest(p: &Parameters) -> (&'static str, f64) {
+    let mut fastest = ("", f64::NEG_INFINITY);
+    rates(p, |key, rate, step| {
+        if fastest.0.is_empty() || rate / step > fastest.1 {
+            fastest = (key, rate / step);
+        }
+    });
     fastest
+}
+
+/// The sum of the rates of the parts without a load, 1/s.
+pub(crate) fn total(p: &Parameters) -> f64 {
+    let mut total = 0.0;
+    rates(p, |_, rate, _| total += rate);
+    total
 }
 
 /// Steps per second that a load asks for: its resistance empties the capacitor beside it.

@@ -166,7 +166,8 @@ fn longer_array(edited: &Edited) -> bool {
         .iter()
         .any(|kind| line.starts_with(kind));
     let longer = bits(&edited.edit.new) > bits(&edited.edit.old);
-    is_array && line.contains(&format!("[{}];", edited.edit.old)) && longer
+    // a number that is read from an array is no array
+    is_array && !line.contains(" = ") && line.contains(&format!("[{}];", edited.edit.old)) && longer
 }
 
 fn disjoint_bits(edited: &Edited) -> bool {

@@ -330,6 +330,12 @@ fn an_edit_where_one_number_of_the_state_alone_leads_fails() {
     all_fail(&example(), &edits);
 }
 
+/// Two clips of the same bits in one step: what has to be looked for.
+#[test]
+fn clips_that_are_wrongly_joined_fail() {
+    all_fail(&golden_case("constructs"), &[("f62 = f13 | f23", "f62 = f13 ^ f23")]);
+}
+
 /// A duty that lies within its limits but for the sign, and a cap that is the duty itself.
 #[test]
 fn an_edit_at_a_mirrored_duty_or_an_equal_cap_fails() {

@@ -1,6 +1,7 @@
 //! Shows by SMT that the emitted C and Rust do what the contract says.
 
 mod c;
+mod comparison;
 mod emitted;
 mod facts;
 mod float;

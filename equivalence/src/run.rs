@@ -43,18 +43,18 @@ pub struct Claim {
 /// How goals are run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// Time for one goal.
+    /// Time for one goal, where the solver's own limit of work ([`Solver::work`]) does not come first.
     pub limit: Duration,
     /// Solvers at a time.
     pub parallel: usize,
 }
 
 impl Default for Options {
-    /// A minute a goal, two at a time.
+    /// Ten minutes a goal, two at a time.
     fn default() -> Self {
         Options {
-            // the slowest goal of the examples takes a fiftieth of it
-            limit: Duration::from_secs(60),
+            // a busy machine reaches the limit of work within it, so that the answer does not depend on the machine
+            limit: Duration::from_secs(600),
             parallel: 2,
         }
     }
@@ -122,6 +122,10 @@ fn verdict(goal: &Goal, solver: &Solver, limit: Duration, interrupt: &AtomicBool
     match answer.split_whitespace().next() {
         Some("unsat") => Verdict::Proved,
         Some("sat") => Verdict::Refuted(model(goal, solver, limit, interrupt)),
+        Some("unknown") => Verdict::Unknown(match solver.work() {
+            Some(work) => format!("no answer within the limit of work: {work}"),
+            None => "the solver says: unknown".into(),
+        }),
         _ => Verdict::Unknown(format!("the solver says: {}", answer.trim())),
     }
 }

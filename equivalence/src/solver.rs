@@ -16,22 +16,41 @@ pub struct Solver {
     pub version: String,
     program: PathBuf,
     arguments: Vec<String>,
+    /// What it may do for one goal, in a unit of its own; nothing if it has no such limit.
+    work: Option<&'static str>,
 }
 
 /// Fastest on these goals first; the measurements are in `docs/reference/equivalence.md`.
-const KNOWN: [(&str, &[&str], &str); 3] = [
-    ("bitwuzla", &["--lang", "smt2"], "--version"),
-    ("cvc5", &["--lang", "smt2", "--produce-models"], "--version"),
-    ("z3", &["-in", "-smt2"], "--version"),
+const KNOWN: [(&str, &[&str], Option<&str>); 3] = [
+    ("bitwuzla", &["--lang", "smt2"], None),
+    (
+        "cvc5",
+        &["--lang", "smt2", "--produce-models", "--rlimit-per=10000000"],
+        Some("10000000 of cvc5's resource units"),
+    ),
+    (
+        "z3",
+        &["-in", "-smt2", "rlimit=500000000"],
+        Some("500000000 of z3's resource units"),
+    ),
 ];
 
-/// Bitwuzla as a Python package: its own parser, over a pipe.
+/// Bitwuzla as a Python package: its own parser, over a pipe. Its search asks now and then whether to go on, and always as often for the
+/// same goal: so a count of that is a limit that does not depend on the machine.
+// fifteen times what the slowest goal of the random policies takes
 const PYTHON: &str = "import sys, bitwuzla
 options = bitwuzla.Options()
 options.set(bitwuzla.Option.PRODUCE_MODELS, True)
 parser = bitwuzla.Parser(bitwuzla.TermManager(), options)
+asked = 0
+def is_over():
+    global asked
+    asked += 1
+    return asked > 4000000
+parser.configure_terminator(is_over)
 parser.parse(sys.stdin.read(), parse_only=False, parse_file=False)
 ";
+const PYTHON_WORK: &str = "4000000 questions of Bitwuzla's search whether to go on";
 const PYTHON_VERSION: &str = "import bitwuzla, importlib.metadata as m; print(m.version('bitwuzla'))";
 
 /// How often a running solver is looked at.
@@ -44,14 +63,15 @@ impl Solver {
     #[must_use]
     pub fn find() -> Vec<Solver> {
         let mut found = Vec::new();
-        for (name, arguments, version) in KNOWN {
+        for (name, arguments, work) in KNOWN {
             let program = PathBuf::from(name);
             let arguments = arguments.iter().map(|argument| (*argument).to_owned()).collect();
-            found.extend(said(&program, &[version]).map(|said| Solver {
+            found.extend(said(&program, &["--version"]).map(|said| Solver {
                 name,
                 version: number_in(&said),
                 program,
                 arguments,
+                work,
             }));
             if name == "bitwuzla" && found.is_empty() {
                 found.extend(Solver::in_python(Path::new("python3")));
@@ -69,6 +89,7 @@ impl Solver {
             version: format!("{} in Python", number_in(&version)),
             program: python.to_owned(),
             arguments: vec!["-c".into(), PYTHON.into()],
+            work: Some(PYTHON_WORK),
         })
     }
 
@@ -76,6 +97,12 @@ impl Solver {
     #[must_use]
     pub fn title(&self) -> String {
         format!("{} {}", self.name, self.version)
+    }
+
+    /// The work after which it gives a goal up, wherever it runs; nothing if the clock alone ends it.
+    #[must_use]
+    pub fn work(&self) -> Option<&'static str> {
+        self.work
     }
 
     /// What the solver answers to `text`, within `limit`; the process ends with the call.
@@ -175,6 +202,7 @@ mod tests {
             version: String::new(),
             program: "sleep".into(),
             arguments: vec!["1000".into()],
+            work: None,
         }
     }
 

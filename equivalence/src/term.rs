@@ -208,7 +208,8 @@ impl Terms {
     }
 
     pub(crate) fn compare(&self, comparison: Comparison, x: Term, y: Term) -> Term {
-        self.make(Op::Float(comparison), vec![x, y], Sort::Truth)
+        self.simple_compare(comparison, x, y)
+            .unwrap_or_else(|| self.make(Op::Float(comparison), vec![x, y], Sort::Truth))
     }
 
     pub(crate) fn not(&self, x: Term) -> Term {

@@ -301,6 +301,11 @@ fn an_edit_where_random_moves_seldom_come_fails() {
         ("    span.to = BUCK12_ACTIONS;\n", ""),
         ("check->position = span.to;", ""),
         ("? check->position : 0u;", "? check->position : 1u;"),
+        // the first slice that touches a table takes all of it: the answer is the same in the end
+        (
+            "to = buck12_place(span, span->to, length);",
+            "to = ((span->from > span->first) || (span->to <= span->first)) ? 0u : length;",
+        ),
         // the tables of a sound build have the right checksum: another one has to be brought along
         ("(span.crc ^ 0xFFFFFFFFu) == 0x", "(span.crc ^ 0xFFFFFFFFu) >= 0x"),
         ("(span.crc ^ 0xFFFFFFFFu) == 0x", "(span.crc ^ 0xFFFFFFFFu) <= 0x"),
@@ -323,6 +328,12 @@ fn an_edit_where_one_number_of_the_state_alone_leads_fails() {
         ),
     ];
     all_fail(&example(), &edits);
+}
+
+/// Two clips of the same bits in one step: what has to be looked for.
+#[test]
+fn clips_that_are_wrongly_joined_fail() {
+    all_fail(&golden_case("constructs"), &[("f62 = f13 | f23", "f62 = f13 ^ f23")]);
 }
 
 /// A duty that lies within its limits but for the sign, and a cap that is the duty itself.

@@ -31,6 +31,19 @@ pub struct Subject {
     pub state_numbers: String,
     /// The mappings that can be set.
     pub mappings: Vec<Settable>,
+    /// Lengths of the slices in which the tables are checked.
+    pub slices: Vec<Slices>,
+    /// What the sum of checksums is multiplied by before the next one, as a literal.
+    pub slice_weight: String,
+}
+
+/// A length of slices of the integrity check.
+#[derive(Debug, Clone)]
+pub struct Slices {
+    /// Numbers of a slice, as a literal.
+    pub length: String,
+    /// Weighted sum of the checksums behind all slices, as a literal.
+    pub sum: String,
 }
 
 /// A mapping whose coefficients a move sets.

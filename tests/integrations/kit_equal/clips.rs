@@ -94,6 +94,10 @@ pub fn one_side_alone(edited: &Edited) -> bool {
     }
     let clips = Clips::of(edited);
     let (before, own) = (clips.members(left), clips.members(right));
+    // words of something else than clips
+    if before.is_empty() || own.is_empty() {
+        return false;
+    }
     let joined = before.iter().chain(&own);
     let later: Vec<&Feature> = clips
         .leaves

@@ -6,7 +6,7 @@
 mod clips;
 mod network;
 
-use policy::Policy;
+use policy::{Activation, Policy};
 
 use super::kit_edits::Edit;
 use clips::one_side_alone;
@@ -43,7 +43,7 @@ const RULES: &[Rule] = &[
     ),
     (
         first_index,
-        "kept where every Q value is a NaN: the state is not sound then, and the mask gives action 0",
+        "kept where every Q value is a NaN: the state is not sound then, and the mask gives action 0; behind a tanh none is",
     ),
     (
         at_the_start,
@@ -166,7 +166,8 @@ fn longer_array(edited: &Edited) -> bool {
         .iter()
         .any(|kind| line.starts_with(kind));
     let longer = bits(&edited.edit.new) > bits(&edited.edit.old);
-    is_array && line.contains(&format!("[{}];", edited.edit.old)) && longer
+    // a number that is read from an array is no array
+    is_array && !line.contains(" = ") && line.contains(&format!("[{}];", edited.edit.old)) && longer
 }
 
 fn disjoint_bits(edited: &Edited) -> bool {
@@ -205,7 +206,14 @@ fn behind_the_limits(edited: &Edited) -> bool {
 
 fn first_index(edited: &Edited) -> bool {
     let actions = edited.table("duties").len();
-    edited.line() == "uint32_t index = 0u;" && bits(&edited.edit.new).is_some_and(|new| (new as usize) < actions)
+    let is_action = bits(&edited.edit.new).is_some_and(|new| (new as usize) < actions);
+    // limited by its bits, so that a NaN leaves it as a number; what stands behind it is a number then
+    let has_tanh = edited
+        .policy
+        .layers
+        .iter()
+        .any(|layer| layer.activation == Activation::Tanh);
+    edited.line() == "uint32_t index = 0u;" && (is_action || has_tanh)
 }
 
 fn without_arguments(edited: &Edited) -> bool {

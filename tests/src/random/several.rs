@@ -59,49 +59,8 @@ pub fn legs(case: &str) -> std::io::Result<Folder> {
     Ok(Folder { folder, contract })
 }
 
-const LEGS: &str = r#"[[output]]
-name = "left"
-[output.actions]
-duties = [0.4, 0.6]
-[output.mapping]
-file = "left.toml"
-load_current = "i_out"
-[output.limits]
-duty = [0.3, 0.68]
-slew = 0.06
-soft_start = { from = 0.35, steps = 20 }
-initial_duty = 0.45
-[output.fallback]
-duty = 0.02
-
-[[output]]
-name = "right"
-[output.actions]
-duties = [0.35, 0.62]
-[output.mapping]
-file = "right.toml"
-load_current = "i_out"
-[output.limits]
-duty = [0.25, 0.75]
-slew = 0.05
-soft_start = { from = 0.3, steps = 40 }
-initial_duty = 0.4
-[output.fallback]
-duty = 0.05
-
-[[output]]
-name = "mid"
-[output.actions]
-continuous = { squash = "tanh", scale = 0.3, offset = 0.5 }
-[output.limits]
-duty = [0.48, 0.52]
-initial_duty = 0.5
-[output.fallback]
-duty = 0.1
-
-[fallback]
-hold = 3
-"#;
+/// Those of the construct suite of the kit.
+const LEGS: &str = include_str!("../../../verify/src/kit/constructs/outputs.toml");
 
 /// How a contract with several outputs is read.
 #[must_use]

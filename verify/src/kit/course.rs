@@ -5,6 +5,7 @@
 //!  damaged    each number just outside of what a sound state holds          what no run meets
 //!  capped     a soft start that stands at the duty itself                   what a run meets by chance
 //!  tied       two actions of exactly equal value                            what a run meets once in millions of steps
+//!  sided      both sides of every sum of the network, clips that are alike  what has to be looked for
 //!  random     the stream of `policyc verify`
 //! ```
 
@@ -14,6 +15,7 @@ use policy::{Policy, Scalar};
 
 use super::damage::damages;
 use super::directed::{self, Move};
+use super::sides::Sides;
 use crate::oracle::{Chunk, Oracle};
 use crate::protocol::{Layout, sample_words};
 use crate::traces::{Event, Stream, nudged, sample_of};
@@ -42,11 +44,13 @@ enum Seen {
 
 /// The interpreter on its way, and what is written down.
 pub struct Course<'a, T> {
-    policy: &'a Policy,
-    oracle: Oracle<T>,
+    pub(super) policy: &'a Policy,
+    pub(super) oracle: Oracle<T>,
     layout: Layout,
     /// All moves so far.
     pub trace: Trace,
+    /// Where they have led.
+    pub(super) sides: Sides,
 }
 
 impl<'a, T: Real> Course<'a, T> {
@@ -58,10 +62,15 @@ impl<'a, T: Real> Course<'a, T> {
             layout: oracle.layout().clone(),
             oracle,
             trace: Trace::default(),
+            sides: Sides::default(),
         }
     }
 
-    fn play(&mut self, event: Event) -> Result<(), InputError> {
+    pub(super) fn play(&mut self, event: Event) -> Result<(), InputError> {
+        if let Event::Step(samples) = &event {
+            let trace = self.oracle.controller().eval(samples)?;
+            self.sides.note(self.policy, &trace);
+        }
         let chunk = self.oracle.chunk_of(vec![event])?;
         append(self.policy, &self.layout, &chunk, Seen::Numbers, &mut self.trace);
         Ok(())
@@ -81,7 +90,7 @@ impl<'a, T: Real> Course<'a, T> {
     }
 
     /// Another state, word by word.
-    fn put(&mut self, change: impl FnOnce(&mut State<T>)) {
+    pub(super) fn put(&mut self, change: impl FnOnce(&mut State<T>)) {
         let mut state = self.oracle.controller().state().clone();
         let mut words = state.words();
         change(&mut state);

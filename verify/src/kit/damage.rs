@@ -51,7 +51,7 @@ impl<T: Real> Damage<T> {
     }
 
     /// With filters that are primed, and the check words that belong to the coefficients.
-    fn primed(numbers: Vec<(usize, T)>) -> Self {
+    pub(super) fn primed(numbers: Vec<(usize, T)>) -> Self {
         Damage {
             check: CheckWord::Anew,
             counters: Some((0, 1)),

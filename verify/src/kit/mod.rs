@@ -1,8 +1,12 @@
 //! What the back-to-back kit compares with: the interpreter's answers on the policy and on the construct suite.
 
+mod alike;
 mod course;
 mod damage;
 mod directed;
+mod place;
+mod several;
+mod sides;
 
 use codegen::backend::kit::{Material, Trace};
 use codegen::{Language, Output};
@@ -63,9 +67,16 @@ pub fn material(policy: &Policy, target: &TargetSpec, steps: u32) -> Result<Mate
         Scalar::F32 => constructs()?,
         Scalar::F64 => constructs()?.with_format(NumericFormat::F64),
     };
-    let suite = [("suite", target.c_row_block), ("blocks", BLOCK)].map(|(name, block)| {
+    let legs = several::legs()?.with_format(constructs.numeric_format);
+    let parts = [
+        ("suite", target.c_row_block),
+        ("blocks", BLOCK),
+        ("legs", target.c_row_block),
+    ];
+    let suite = parts.map(|(name, block)| {
         let mut part = match name {
             "blocks" => others(&constructs),
+            "legs" => legs.clone(),
             _ => constructs.clone(),
         };
         // the user may link several kits into one program
@@ -75,10 +86,11 @@ pub fn material(policy: &Policy, target: &TargetSpec, steps: u32) -> Result<Mate
             ..target.clone()
         };
         let program = codegen::lower(&part, &target, Language::C);
-        // the second differs from the first in its network alone: what leads elsewhere would only take memory once more
+        // the second differs from the first in its network alone, the third in its outputs: all moves of the first would only take
+        // memory once more
         let moves = match name {
-            "blocks" => Moves::Random,
-            _ => Moves::All,
+            "suite" => Moves::All,
+            _ => Moves::Random,
         };
         trace(&part, SUITE_STEPS, moves).map(|trace| (program, trace))
     });
@@ -139,6 +151,8 @@ fn trace_in<T: Real>(policy: &Policy, steps: u32, moves: Moves) -> Result<Trace,
         course.damaged().map_err(VerifyError::Interpreter)?;
         course.capped().map_err(VerifyError::Interpreter)?;
         course.tied().map_err(VerifyError::Interpreter)?;
+        course.sided().map_err(VerifyError::Interpreter)?;
+        course.alike().map_err(VerifyError::Interpreter)?;
     }
     course.random(steps, SEED).map_err(VerifyError::Interpreter)?;
     Ok(course.trace)

@@ -4,6 +4,7 @@
 //! everything the C backend can print), and the policy itself. Expected values come from outside as [`Material`].
 
 mod probes;
+mod slices;
 mod texts;
 mod trace;
 
@@ -105,6 +106,8 @@ fn subject(kit: &str, program: &Program, trace: &Trace) -> Subject {
         state_crc: texts.state_crc("0xFFFFFFFFu", "state."),
         state_numbers: unsigned(((program.state_words() - 2) / program.scalar().words()) as u32),
         mappings: settable(&texts),
+        slices: slices::of(program),
+        slice_weight: unsigned(slices::WEIGHT),
     }
 }
 

@@ -1,0 +1,87 @@
+//! What proofs of random policies cost: a table for `docs/results/proofs.md`, on demand.
+//!
+//! `POLICYC_PROVE_TABLE=FIRST,COUNT cargo test -p tests --test prove table -- --nocapture` prints a row a policy and format.
+
+use std::time::Instant;
+
+use policy::NumericFormat;
+use prove::{Claim, Eva, Prover, Smt, Verdict};
+
+use super::{task, watched};
+
+const FORMATS: [NumericFormat; 4] = [
+    NumericFormat::F32,
+    NumericFormat::F64,
+    NumericFormat::I16,
+    NumericFormat::I8,
+];
+
+/// Seconds of processor that ended child processes have taken, with theirs: user and system.
+// the clock of a busy machine says nothing; Linux counts ticks of a hundredth of a second for every program that it runs
+fn seconds_of_children() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // the name in brackets may hold anything; behind it the state is field 3
+    let behind = text.rsplit(')').next().unwrap_or_default();
+    let ticks = behind.split_whitespace().skip(13).take(2);
+    ticks.filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
+}
+
+/// Claims of a prover, and what it took.
+fn proved_by(prover: &dyn Prover, policy: &policy::Policy) -> (Vec<Claim>, f64) {
+    let before = seconds_of_children();
+    let claims = watched(|watch| prover.prove(task(policy), watch)).unwrap();
+    (claims, seconds_of_children() - before)
+}
+
+fn count(claims: &[Claim], verdict: Verdict) -> usize {
+    claims.iter().filter(|claim| claim.verdict == verdict).count()
+}
+
+/// Every claim that a prover tried is proved; with the variable alone, since a policy takes half a minute.
+#[test]
+fn a_table_of_random_policies_has_no_open_claim() {
+    let Ok(range) = std::env::var("POLICYC_PROVE_TABLE") else {
+        return;
+    };
+    let (first, number) = range.split_once(',').unwrap();
+    let first: u64 = first.parse().unwrap();
+    let number: u64 = number.parse().unwrap();
+    let mut open = Vec::new();
+    println!("| seed | format | claims proved | not run | open | Eva s | SMT s | slowest goal |");
+    println!("|---|---|---:|---:|---:|---:|---:|---|");
+    for seed in first..first + number {
+        let folder = tests::random::policy(seed).unwrap();
+        let policy = policy::load(&folder.path()).unwrap();
+        for format in FORMATS {
+            let start = Instant::now();
+            let policy = policy.clone().with_format(format);
+            let (by_eva, eva) = proved_by(&Eva, &policy);
+            let (by_solver, smt) = proved_by(&Smt, &policy);
+            let slowest = by_solver.iter().max_by(|x, y| x.seconds.total_cmp(&y.seconds)).unwrap();
+            let name = &slowest.name;
+            let all = [by_eva.clone(), by_solver.clone()].concat();
+            let (proved, not_run) = (count(&all, Verdict::Proved), count(&all, Verdict::NotRun));
+            println!(
+                "| {seed} | {} | {proved} | {not_run} | {} | {eva:.1} | {smt:.1} | {name} |",
+                format.name(),
+                all.len() - proved - not_run
+            );
+            eprintln!(
+                "{seed} {}: {:.0} s of the clock",
+                format.name(),
+                start.elapsed().as_secs_f64()
+            );
+            let is_open = |claim: &&Claim| !matches!(claim.verdict, Verdict::Proved | Verdict::NotRun);
+            open.extend(all.iter().filter(is_open).map(|claim| {
+                format!(
+                    "{seed} {}: {}: {} {:?}",
+                    format.name(),
+                    claim.name,
+                    claim.reason,
+                    claim.details
+                )
+            }));
+        }
+    }
+    assert!(open.is_empty(), "{open:#?}");
+}

@@ -16,7 +16,7 @@ use diagnose::record::Record;
 use measured::{ColumnMap, Sheet};
 use plant::{Parameters, Rectifier};
 
-/// A synchronous leg that is sampled where its period starts, under load steps at instants of their own.
+/// A synchronous leg, whose current stays above 0, sampled where its period starts, under load steps just before such instants.
 fn stepped(capacitance: f64) -> Bench {
     Bench {
         rows: 320,
@@ -26,11 +26,11 @@ fn stepped(capacitance: f64) -> Bench {
         v_f: 0.0,
         r_d: 0.04,
         load: vec![
-            (0.0, 0.0, 4.0),
-            (61.3, 0.0, 7.5),
-            (127.8, 0.0, 5.0),
-            (190.4, 0.0, 9.0),
-            (260.7, 0.0, 4.0),
+            (0.0, 0.0, 8.0),
+            (60.92, 0.0, 10.5),
+            (127.95, 0.0, 9.0),
+            (189.97, 0.0, 12.0),
+            (259.94, 0.0, 8.0),
         ],
         ..Bench::default()
     }
@@ -82,7 +82,9 @@ fn a_capacitor_that_lost_a_third_is_found_below_a_coarse_meter() {
     let bench = stepped(100e-6);
     let found = diagnosed(&table(&bench, 0.4, 0.02, 21), &table(&bench, 0.4, 0.02, 22));
     let causes = &found.findings.causes;
-    assert_eq!(causes.iter().map(|cause| cause.id).collect::<Vec<_>>(), ["c_wrong"]);
+    // the digit is one of the bench that the model has not, and is named as such
+    let ids: Vec<&str> = causes.iter().map(|cause| cause.id).collect();
+    assert_eq!(ids, ["c_wrong", "adc_quantisation"]);
     let c = causes[0].parameters["capacitance"].value;
     assert!((c / 100e-6 - 1.0).abs() < 0.02, "{c}");
     let notes = found.findings.noise.repairs.join("\n");

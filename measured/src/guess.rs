@@ -338,7 +338,7 @@ mod tests {
             Some("--map i_out=Iload")
         );
         // a set load that goes to and fro stays for some rows
-        let to_and_fro = |n: u32| if n / 6 % 2 == 0 { 5.0 } else { 5.2 };
+        let to_and_fro = |n: u32| [5.0, 5.2][(n / 6 % 2) as usize];
         assert_eq!(of_rows(&to_and_fro, None).as_deref(), Some("--map i_load=Iload"));
         // another one is the measured load current
         assert_eq!(proposed(0.02, Some("i_out")).as_deref(), Some("--map i_load=Iload"));

@@ -6,6 +6,7 @@
 //! ```
 //! The middle of the differences from row to row is 0 there, and so is any estimate of noise that rests on middles.
 
+use measured::is_metered;
 use plant::Load;
 
 use crate::slopes::{LoadStep, load_steps};
@@ -16,8 +17,6 @@ const TIED: f64 = 0.2;
 const MOST_DIGITS: f64 = 4.5;
 /// Differences below this share of a digit are none but for the binary form of decimal numbers.
 const SAME: f64 = 1e-3;
-/// A load that changes in fewer of its rows steps, and does not flicker: steps of a test stand tens of rows apart.
-const OFTEN: f64 = 0.1;
 /// A change of so many standard deviations of the difference of two rows is a step.
 const STEP: f64 = 4.0;
 
@@ -57,12 +56,13 @@ fn within(load: &[Load]) -> f64 {
         .map(|pair| (pair[1].current - pair[0].current).abs())
         .filter(|change| *change > 0.0)
         .collect();
-    if (changes.len() as f64) < OFTEN * load.len() as f64 {
+    let current: Vec<f64> = load.iter().map(|load| load.current).collect();
+    // a staircase of one digit each, or a load that is pulsed, steps
+    if !is_metered(&current) {
         return 0.0;
     }
     // digits written as decimals are one apart but for their binary form
     let digit = changes.iter().copied().fold(f64::INFINITY, f64::min);
-    let current: Vec<f64> = load.iter().map(|load| load.current).collect();
     let noise = noise(&current, digit);
     if noise.is_nan() {
         return 0.0;
@@ -126,6 +126,8 @@ mod tests {
             );
         }
         let clean: Vec<Load> = (0..200).map(|n| Load::current(2.0 + 0.01 * (n / 20) as f64)).collect();
+        let pulsed: Vec<Load> = (0..200).map(|n| Load::current([5.0, 5.4][n / 7 % 2])).collect();
+        assert_eq!(steps(&pulsed).len(), 28, "so do pulses");
         assert_eq!(steps(&clean).len(), 9, "small steps of a load that was set stay steps");
     }
 }

@@ -19,6 +19,7 @@ use crate::findings::{Findings, Gain, Hidden, Named, Noise, Verdict};
 use crate::fit::State;
 use crate::gain::{Pair, Shift};
 use crate::instants;
+use crate::left_out;
 use crate::noise::{self, Outlier};
 use crate::preflight;
 use crate::problem::{Problem, capture_drive};
@@ -410,6 +411,11 @@ fn notes(found: &Examined, pair: Option<&Pair>) -> Vec<String> {
     let held = pair.map_or(&[][..], |pair| &pair.problem.records);
     let records = problem.records.iter().chain(held);
     let mut notes = by_text(records);
+    notes.extend(left_out::notes(problem, &found.outliers));
+    notes.extend(
+        pair.into_iter()
+            .flat_map(|pair| left_out::notes(&pair.problem, &pair.spikes)),
+    );
     notes.extend(noise::too_clean(problem, &attribution.null.residual));
     notes.extend(quantised::note(problem));
     notes.extend(crate::backward::note(problem));

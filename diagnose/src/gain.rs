@@ -13,7 +13,7 @@ use crate::problem::{Problem, dot};
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Record};
 use crate::sampling;
 use crate::unsure_levels;
-use crate::words::si;
+use crate::words::{noise as noise_said, si};
 
 /// Which rows of a record are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -79,7 +79,8 @@ impl Held {
     /// In words.
     #[must_use]
     pub fn words(&self) -> String {
-        let [before, after, floor] = [self.rmse_before, self.rmse_after, self.floor].map(|value| si(value, self.unit));
+        let [before, after] = [self.rmse_before, self.rmse_after].map(|value| si(value, self.unit));
+        let floor = noise_said(self.rmse_after, self.floor, self.unit);
         format!(
             "held-out: {} of {}: error {before} before, {after} after, noise {floor}",
             self.channel, self.record
@@ -138,6 +139,8 @@ pub struct Pair {
     pub after: State,
     /// What was noticed about the records.
     pub remarks: Vec<String>,
+    /// Single rows that are left out.
+    pub spikes: Vec<noise::Outlier>,
 }
 
 /// Simulates the held-out records with both models. `sigma` is the noise of the training records, `trim` what the
@@ -172,6 +175,7 @@ pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHA
             after,
             problem,
             remarks,
+            spikes,
         };
     }
     Pair {
@@ -179,6 +183,7 @@ pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHA
         before,
         after,
         remarks,
+        spikes,
     }
 }
 

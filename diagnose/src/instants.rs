@@ -15,11 +15,12 @@
 use crate::basis::FARTHEST;
 use crate::drive::{FREE_APART, Model};
 use crate::fit::State;
+use crate::flicker;
 use crate::level::threshold;
 use crate::parallel;
 use crate::problem::{Problem, Starts, dot};
 use crate::record::{CHANNELS, Record};
-use crate::slopes::{LoadStep, load_steps};
+use crate::slopes::LoadStep;
 
 /// Steps closer to where the record has them are where the record has them: of about that size (5 us at 10 kHz, .1 V at 150 uF)
 /// is what two simulators of one load step differ by.
@@ -43,7 +44,7 @@ fn steps(record: &Record) -> Vec<LoadStep> {
     if record.settled || !record.dense {
         return Vec::new();
     }
-    let all = load_steps(&record.load);
+    let all = flicker::steps(&record.load);
     let alone = |step: &LoadStep| {
         let mut others = all.iter().filter(|other| *other != step);
         others.all(|other| step.first.abs_diff(other.last).min(other.first.abs_diff(step.last)) >= 2 * FREE_APART)

@@ -3,6 +3,7 @@
 mod few;
 
 use crate::exact::Exact;
+use crate::flicker;
 use crate::median::median;
 use crate::problem::{Problem, dot};
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
@@ -46,7 +47,8 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
                 rows.retain(|row| values[*row] != 0.0);
             }
             let shown: Vec<f64> = rows.iter().map(|row| values[*row]).collect();
-            scatter(&shown, |triple| triple.iter().all(|v| *v != 0.0))
+            let digit = one.lattice[n].max(one.resolution[n]) / problem.sigma[n];
+            scatter(&shown, |triple| triple.iter().all(|v| *v != 0.0)).max(flicker::noise(&shown, digit))
         };
         // the median: one noisy record must not hide what the others show
         let typical = median((0..problem.records.len()).map(of)) * few::unsure(problem, n);

@@ -10,15 +10,18 @@ use measured::DutyIs;
 use crate::capture::terms::Drive;
 use crate::causes::{Bases, Knob};
 use crate::drive::{Begin, Model, Start, simulate};
+use crate::flicker;
 use crate::ideal::{self, Ideal};
 use crate::noise::Outlier;
 use crate::record::{CHANNELS, Record};
-use crate::slopes::load_steps;
 use crate::work::Work;
 use setup::{bases, cut_unstable, share_source_voltage};
 
 /// What stands in a residual where no number is simulated: far beyond any real error, and its square still a number.
 pub const LOST: f64 = 1e6;
+
+/// What stands in a residual where a value that counts is met to its last digit, over the noise: 0 says that nothing counts.
+const NO_ERROR: f64 = 1e-12;
 
 /// The channels in which a load step leaps.
 const OUTPUT_VOLTAGE: usize = 0;
@@ -122,7 +125,7 @@ fn in_steps(record: &Record) -> [Vec<bool>; CHANNELS] {
     let mut masked = std::array::from_fn(|_| vec![false; record.rows()]);
     let (before, behind) = (record.phase > 1.0 - AT_ONCE, record.phase < AT_ONCE);
     // between rows further apart nobody takes a load for one of a slope
-    for step in load_steps(&record.load)
+    for step in flicker::steps(&record.load)
         .iter()
         .filter(|_| record.dense && !record.settled)
     {
@@ -265,9 +268,10 @@ impl Problem {
     fn scored(&self, error: f64, channel: usize) -> f64 {
         let sigma = self.sigma[channel];
         match error / sigma {
-            scored if scored.is_finite() => scored,
             // nobody knows this channel's noise: it is not compared, whatever the model says
             _ if sigma.is_infinite() => 0.0,
+            0.0 => NO_ERROR,
+            scored if scored.is_finite() => scored,
             _ => LOST,
         }
     }

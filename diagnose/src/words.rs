@@ -110,6 +110,19 @@ fn values(causes: &[Named]) -> String {
     words.collect::<Vec<_>>().join("; ")
 }
 
+/// An error below this share of the noise is told beside a word on how that is estimated: less than 1 by more than chance, in a
+/// record of a hundred rows and more.
+const BELOW: f64 = 0.9;
+
+/// The noise beside an error of the better model: second differences of a record that rings see its bends as noise.
+pub fn noise(after: f64, floor: f64, of: &'static str) -> String {
+    let said = si(floor, of);
+    match after < BELOW * floor {
+        true => format!("{said} as estimated from neighbouring rows, which is high where a record rings"),
+        false => said,
+    }
+}
+
 /// A value of a cause, in its unit or as the word that stands for it.
 pub fn told(id: &str, value: f64, of: &'static str) -> String {
     timing::word(id, value).map_or_else(|| si(value, unit(of)), str::to_owned)

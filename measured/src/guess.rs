@@ -304,16 +304,16 @@ mod tests {
         // what was set: a step; what a meter showed: the same with a jitter of some milliamperes
         let set = |n: u32| if n < 30 { 2.0 } else { 5.0 };
         let jitter = |n: u32| f64::from(n.wrapping_mul(2_654_435_761) >> 16) / 65_536.0 - 0.5;
-        let proposed = |noise: f64, other: Option<&str>| {
+        let of_rows = |load: &dyn Fn(u32) -> f64, other: Option<&str>| {
             let header = format!(
                 "t;duty;v_out;Iload{}",
                 other.map(|name| format!(";{name}")).unwrap_or_default()
             );
             let row = |n: u32| {
-                let load = set(n) + noise * jitter(n);
                 format!(
-                    "{};0.25;12.1;{load}{}\n",
+                    "{};0.25;12.1;{:.5}{}\n",
                     f64::from(n) * 1e-5,
+                    load(n),
                     other.map_or("", |_| ";2.0")
                 )
             };
@@ -322,8 +322,24 @@ mod tests {
             let located = sheet.locate(&VOCABULARY, &ColumnMap::default()).unwrap();
             proposal(&sheet.guesses(&located, &VOCABULARY))
         };
+        let proposed = |noise: f64, other: Option<&str>| of_rows(&|n| set(n) + noise * jitter(n), other);
         assert_eq!(proposed(0.0, None).as_deref(), Some("--map i_load=Iload"));
         assert_eq!(proposed(0.02, None).as_deref(), Some("--map i_out=Iload"));
+        // a meter whose last digit shows what noise there is, beside one row in five
+        let last_digit = |n: u32| {
+            if n % 5 == 3 {
+                [0.01, -0.01][(n / 5 % 2) as usize]
+            } else {
+                0.0
+            }
+        };
+        assert_eq!(
+            of_rows(&|n| set(n) + last_digit(n), None).as_deref(),
+            Some("--map i_out=Iload")
+        );
+        // a set load that goes to and fro stays for some rows
+        let to_and_fro = |n: u32| [5.0, 5.2][(n / 6 % 2) as usize];
+        assert_eq!(of_rows(&to_and_fro, None).as_deref(), Some("--map i_load=Iload"));
         // another one is the measured load current
         assert_eq!(proposed(0.02, Some("i_out")).as_deref(), Some("--map i_load=Iload"));
     }

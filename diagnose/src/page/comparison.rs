@@ -7,11 +7,12 @@ use super::empirical;
 use super::records::{self, PARTLY};
 use crate::diagnosis::Diagnosis;
 use crate::fit::State;
+use crate::left_out;
 use crate::noise::channel;
 use crate::problem::{LOST, Problem};
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
 use crate::whiteness::{self, Driven, Largest};
-use crate::words::si;
+use crate::words::{noise as noise_said, si};
 use crate::worth::Worth;
 
 /// An error that white noise passes by this chance is no white one. A convention of tests, and no verdict hangs on it.
@@ -41,6 +42,8 @@ pub struct Compared {
     pub heldout: bool,
     /// Values that count.
     pub values: usize,
+    /// Rows that were measured and are left out: spikes, and the samples at a load step.
+    pub left_out: usize,
     /// Standard deviation of the noise.
     pub noise: f64,
     /// Unit of errors and noise.
@@ -108,6 +111,7 @@ fn of(
                 channel: name,
                 heldout,
                 values,
+                left_out: left_out::count(problem, index, n).1,
                 noise: problem.sigma[n],
                 unit: CHANNEL_UNITS[n],
                 before: fit(&first),
@@ -150,7 +154,9 @@ pub(super) fn volts(list: &[Compared]) -> Option<String> {
         .filter(|one| best(one) == first && one.before.rmse.is_finite());
     let worst = all.max_by(|a, b| a.before.chi2_per_value.total_cmp(&b.before.chi2_per_value))?;
     let kind = if worst.heldout { "held-out" } else { "training" };
-    let [before, noise] = [worst.before.rmse, worst.noise].map(|value| si(value, worst.unit));
+    let before = si(worst.before.rmse, worst.unit);
+    let last = worst.after.as_ref().unwrap_or(&worst.before).rmse;
+    let noise = noise_said(last, worst.noise, worst.unit);
     let what = format!("In {} of the {kind} record {}", worst.channel, worst.record);
     Some(match (worst.second, worst.after) {
         (Some(second), Some(after)) if after.rmse.is_finite() => format!(
@@ -214,7 +220,7 @@ pub(super) fn section(list: &[Compared], residuals: &[Driven]) -> Section {
             table = table.number(named("after"), decimals);
         }
     }
-    table = table.number("noise", 4).text("unit").text("white");
+    table = table.number("noise", 4).text("unit").text("white").text("rows");
     for one in list {
         let kind = if one.heldout { "held-out" } else { "training" };
         let mut row: Vec<report::Cell> = vec![format!("{} ({kind})", one.record).into(), one.channel.into()];
@@ -235,7 +241,11 @@ pub(super) fn section(list: &[Compared], residuals: &[Driven]) -> Section {
             Some(after) if after.white_chance.is_some() => format!("{} → {}", word(&one.before), word(after)),
             _ => word(&one.before).to_owned(),
         };
-        row.extend([one.noise.into(), one.unit.into(), white.into()]);
+        let rows = match one.left_out {
+            0 => one.values.to_string(),
+            left => format!("{}, without {left}", one.values),
+        };
+        row.extend([one.noise.into(), one.unit.into(), white.into(), rows.into()]);
         table = table.row(row);
     }
     let is_part = list.iter().any(|one| one.second == Some(PARTLY));

@@ -13,6 +13,7 @@ use std::ops::Range;
 
 use plant::Load;
 
+use crate::flicker;
 use crate::noise;
 use crate::slopes::load_steps;
 
@@ -142,7 +143,9 @@ pub fn find(i_out: &[f64], v_out: &[f64], digit: f64, phase: f64) -> Option<Leve
     let known: Vec<usize> = (0..i_out.len()).filter(|n| i_out[*n].is_finite()).collect();
     let values: Vec<f64> = known.iter().map(|n| i_out[*n]).collect();
     // step / sqrt 12: the standard deviation of rounding
-    let noise = noise::scatter(&values, |_| true).max(digit / 12f64.sqrt());
+    let noise = noise::scatter(&values, |_| true)
+        .max(flicker::noise(&values, digit))
+        .max(digit / 12f64.sqrt());
     if noise.is_nan() || noise <= 0.0 {
         return None;
     }

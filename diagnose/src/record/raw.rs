@@ -293,7 +293,7 @@ fn take_for_a_meter(sheet: &Sheet, located: &mut Located) -> Option<String> {
         return None;
     }
     let reason = if is_metered(&readings) {
-        "changes in nearly every row, back and forth, as the readings of a meter do"
+        "changes back and forth from row to row, as the readings of a meter do"
     } else if is_current_of_resistor(sheet, located) {
         "is v_out over r_load in nearly every row, the current of that resistor and no second load"
     } else {
@@ -340,24 +340,30 @@ fn incomplete(sheet: &Sheet, located: &Located, may_be_capture: bool) -> Sink {
         let duty = Quantity::all(&["duty"]);
         list.extend(duty.iter().map(|duty| sheet.missing(duty, hint)));
     }
+    let guesses = sheet.guesses(located, &Quantity::all(&NAMES));
+    let is_guessed = |names: &[&str]| guesses.iter().any(|(name, _)| names.contains(name));
     if !QUANTITIES.into_iter().any(has) && !may_be_capture {
-        let message = Message::new("nothing is measured in this record").found(sheet.listed());
+        let problem = match is_guessed(&QUANTITIES) {
+            true => "no column is known as a measured one: the columns have names of their own and no map",
+            false => "nothing is measured in this record",
+        };
+        let message = Message::new(problem).found(sheet.listed());
         list.push(sheet.header_fault(message.expected("at least one of v_out, i_l, i_out, v_in")));
     }
-    if !LOADS.into_iter().any(has) {
+    // a map that is proposed already mends it
+    if !LOADS.into_iter().any(has) && (list.is_empty() || !is_guessed(&LOADS)) {
         let message = Message::new("nothing says what the load is").found(sheet.listed());
         let hint = "give r_load, i_load or p_load as a column if the load was set, i_out if its current was measured; or for the \
                     whole record: --map r_load=10, or under [constants] in the map file";
         list.push(sheet.header_fault(message.expected("r_load, i_load, p_load or i_out").hint(hint)));
     }
-    let map = proposal(&sheet.guesses(located, &Quantity::all(&NAMES)));
+    let map = proposal(&guesses);
     if let (Some(first), Some(map)) = (list.first_mut(), map) {
         let metered = match map.contains("i_load=") {
             true => " (i_load is a load that was set; for what a meter showed write i_out)",
             false => "",
         };
         // the map last: what is copied ends with the line
-        let record = sheet.file().file_stem().unwrap_or_default().to_string_lossy();
         let named = NAMES.iter().filter_map(|name| Some((name, located.signal(name)?)));
         let by_name: Vec<String> = named
             .filter(|(name, signal)| signal.column().is_some() && signal.label != **name)
@@ -368,8 +374,8 @@ fn incomplete(sheet: &Sheet, located: &Located, may_be_capture: bool) -> Sink {
             false => format!("; {} need no map", by_name.join(", ")),
         };
         let proposed = format!(
-            "these columns look like it, check each{metered}{others}; as [records.{record}.columns] of a map file where other files \
-             have others: {map}"
+            "these columns look like it, check each{metered}{others}; as [records.NAME.columns] of a map file, NAME a file without its \
+             ending, where other files have others: {map}"
         );
         first.hint = Some(match first.hint.take() {
             Some(hint) if has("duty") => format!("{hint}; {proposed}"),

@@ -260,3 +260,14 @@ fn what_cannot_be_designed_is_refused_with_its_reason() {
     late.pwm.carrier = plant::Carrier::Leading;
     assert!(refused(&late, wanted()).contains("leading"));
 }
+
+/// An observer's equations know no sampling instant: its current is that at the start of a period.
+#[test]
+fn the_instant_of_the_sample_changes_nothing_of_an_observer_and_its_law() {
+    let text = |phase: f64| {
+        let mut plant = plant();
+        plant.pwm.sampling_phase = phase;
+        Design::new(&plant, wanted()).unwrap().contract()
+    };
+    assert_eq!(text(0.0), text(0.5));
+}

@@ -10,8 +10,9 @@ use crate::record::Record;
 /// Rows of a plain converter that a diagnosis simulates before it begins nothing more.
 // a core does about a million in a second (0.9 to 1.5, hopeless records of 600 rows and three channels), and 25 s are what a user waits
 const ROWS: u64 = 24_000_000;
-/// What a row costs with a load cable, in rows without: it is integrated in small steps.
-const CABLE: u64 = 25;
+/// What a row costs with a load cable, in rows without.
+// 3.3 M rows a second with an ESR, .7 M behind it a cable of 50 kHz, .3 M one of 160 kHz (docs/results/plant.md)
+const CABLE: u64 = 10;
 /// What a settled point costs: it is sought over many periods.
 const SETTLED: u64 = 30;
 

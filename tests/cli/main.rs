@@ -25,6 +25,7 @@ mod replay;
 mod replayed_clips;
 mod replayed_duties;
 mod replayed_filters;
+mod replayed_formats;
 mod several;
 mod shell;
 mod simulate;

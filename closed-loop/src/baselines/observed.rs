@@ -10,7 +10,7 @@
 //! instant at which the duty begins, so the controller is designed without that delay.
 
 use interp::Real;
-use plant::{Parameters, Signals};
+use plant::{Model, Parameters, Signals};
 use policy::{Policy, Scalar};
 
 use super::{Baseline, Design, Kind};
@@ -52,6 +52,9 @@ pub fn observed(
         .map_or((0, 0), |own| (own.compute_delay, own.load_current));
     let mut parameters = parameters.clone();
     parameters.pwm.duty_delay = parameters.pwm.duty_delay.saturating_sub(delay);
+    // the estimates are those at the start of a switching period, wherever the plant is sampled
+    parameters.pwm.sampling_phase = 0.0;
+    parameters.converter.model = Model::Switched;
     let design = Baseline::new(kind, &parameters, v_ref, i_out)?;
     let by_bias = 1.0 / Design::new(&parameters, v_ref, i_out).span();
     let numbers = (parameters.converter.v_in, by_bias);

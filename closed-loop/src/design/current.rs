@@ -37,7 +37,7 @@ impl CurrentLaw {
     pub fn surplus(&self) -> String {
         let own = &self.nominal;
         let (rest, give) = (short(own.rest), short(own.give));
-        let mean = match short(own.below_mean) {
+        let mean = match short(own.sampled_below_mean) {
             0.0 => String::new(),
             x if x > 0.0 => format!(" + {x}"),
             x => format!(" - {}", -x),

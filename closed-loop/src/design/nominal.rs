@@ -1,6 +1,6 @@
 //! What both laws know of a converter: its nominal values, without losses.
 
-use plant::{Parameters, Rectifier, Topology};
+use plant::{Carrier, Parameters, Rectifier, Topology};
 use toml_input::Message;
 
 use crate::baselines;
@@ -35,8 +35,11 @@ pub struct Nominal {
     pub has_diode: bool,
     /// Half of the current's ripple, A.
     pub half_ripple: f64,
-    /// How far the sampled current lies below its mean, A.
+    /// How far the current that an observer estimates lies below its mean, A: at the start of a period, wherever the plant is sampled,
+    /// as its equations have it.
     pub below_mean: f64,
+    /// How far the measured current lies below its mean where it is sampled, A.
+    pub sampled_below_mean: f64,
     /// The duty at rest, without losses.
     pub rest: f64,
     /// Share of the inductor's current that the output receives at rest.
@@ -89,7 +92,11 @@ impl Nominal {
             compute_delay,
             has_diode: converter.rectifier == Rectifier::Diode,
             half_ripple: design.half_ripple(),
-            below_mean: design.below_mean(),
+            below_mean: match plant.pwm.carrier {
+                Carrier::Centre => 0.0,
+                Carrier::Trailing | Carrier::Leading => design.half_ripple(),
+            },
+            sampled_below_mean: design.below_mean(),
             rest: design.rest(),
             give: design.give(),
             span: design.span(),

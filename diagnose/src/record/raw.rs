@@ -371,7 +371,11 @@ fn incomplete(sheet: &Sheet, located: &Located, may_be_capture: bool) -> Sink {
             .collect();
         let others = match by_name.is_empty() {
             true => String::new(),
-            false => format!("; {} need no map", by_name.join(", ")),
+            false => format!(
+                "; {} need{} no map",
+                by_name.join(", "),
+                if by_name.len() == 1 { "s" } else { "" }
+            ),
         };
         let proposed = format!(
             "these columns look like it, check each{metered}{others}; as [records.NAME.columns] of a map file, NAME a file without its \

@@ -119,13 +119,13 @@ pub fn say_results(folder: &Path, files: &BTreeMap<String, String>, summary: &st
     say(&format!("\n{count} files in {out}; to look at: {out}/{page}"))
 }
 
-/// Writes one file that may not exist yet.
+/// Writes one file that may not exist yet; `flag` is what named it.
 ///
 /// # Errors
 /// If it exists or cannot be written.
-pub fn write_new_one(path: &Path, bytes: Vec<u8>) -> Result<(), Failure> {
+pub fn write_new_one(path: &Path, bytes: Vec<u8>, flag: &str) -> Result<(), Failure> {
     let (folder, name) = split(path)?;
-    write_new(folder, &BTreeMap::from([(name, bytes)]))
+    write_new(folder, &BTreeMap::from([(name, bytes)]), flag)
 }
 
 /// Writes one file, and others by name beside it, none of which may exist yet.
@@ -136,17 +136,19 @@ pub fn write_new_all(path: &Path, text: &str, beside: &BTreeMap<String, Vec<u8>>
     let (folder, name) = split(path)?;
     let mut files = beside.clone();
     files.insert(name, text.as_bytes().to_vec());
-    write_new(folder, &files)
+    write_new(folder, &files, "--out")
 }
 
-fn write_new(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<(), Failure> {
+fn write_new(folder: &Path, files: &BTreeMap<String, Vec<u8>>, flag: &str) -> Result<(), Failure> {
     write_if(folder, files, || {
         let mut paths = files.keys().map(|name| folder.join(name));
         let Some(path) = paths.find(|path| fs::symlink_metadata(path).is_ok()) else {
             return Ok(());
         };
         let message = Message::new(format!("{} exists already; nothing written", path.display()));
-        Err(message.hint("move it away or choose another name with --out").into())
+        Err(message
+            .hint(format!("move it away or choose another name with {flag}"))
+            .into())
     })
 }
 

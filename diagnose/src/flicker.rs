@@ -75,17 +75,7 @@ mod tests {
     use plant::Load;
 
     use super::{noise, steps};
-
-    /// Normal numbers of a linear congruential generator.
-    fn normal(state: &mut u64) -> f64 {
-        let uniform = |_| {
-            *state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (*state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-        };
-        (0..12).map(uniform).sum()
-    }
+    use crate::noise::tests::normal;
 
     /// A level that steps from 2 to 3.5 to 2.5, with noise and a last digit.
     fn metered(sigma: f64, digit: f64, seed: u64) -> Vec<f64> {

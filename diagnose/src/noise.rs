@@ -345,11 +345,11 @@ pub fn left(values: &[f64]) -> Left {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::{leaps_off_curve, scatter};
 
     /// Twelve uniform numbers of a linear congruential generator make a normal one.
-    fn normal(state: &mut u64) -> f64 {
+    pub(crate) fn normal(state: &mut u64) -> f64 {
         let uniform = |_| {
             *state = state
                 .wrapping_mul(6_364_136_223_846_793_005)

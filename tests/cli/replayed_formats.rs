@@ -101,8 +101,14 @@ fn a_log_becomes_golden_answers_that_judge_a_format() {
     );
     let again = desk.type_in("replay buck12 log.csv --golden buck12/of_log.safetensors");
     assert!(
-        again.code == Some(2) && again.stderr.contains("exists already"),
+        again.code == Some(2) && again.stderr.contains("another name with --golden"),
         "{}",
         again.stderr
     );
+    // explored actions are none of the network's, and skipped rows were compared with nothing
+    for unjudged in ["--exploring", "--skip 1"] {
+        let refused = desk.type_in(&format!("replay buck12 log.csv --golden new.safetensors {unjudged}"));
+        assert_eq!(refused.code, Some(2), "{}", refused.stderr);
+        assert!(!desk.path("new.safetensors").exists());
+    }
 }

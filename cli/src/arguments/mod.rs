@@ -155,8 +155,8 @@ pub struct Replay {
     #[arg(long, value_parser = format())]
     pub format: Option<NumericFormat>,
     /// If the log is equal, write it as golden answers, a safetensors file that does not exist yet: its observations, or where it does not have
-    /// all of them the contract's, with its actions or duties
-    #[arg(long, value_name = "FILE")]
+    /// all of them the contract's, with its actions or duties. Not of a log whose actions or first rows are not compared
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["exploring", "skip"])]
     pub golden: Option<PathBuf>,
     /// Largest difference that is equal, as a share of the largest logged magnitude of the feature
     #[arg(long, value_name = "SHARE", default_value_t = ::verify::replay::TOLERANCE, value_parser = share)]

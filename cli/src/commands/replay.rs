@@ -70,7 +70,7 @@ pub fn run(options: &Replay) -> Result<Outcome, Failure> {
     }
     if let Some((file, golden)) = golden {
         let answers = golden.count;
-        output::write_new_one(file, policy::golden_file(&policy, &golden)?)?;
+        output::write_new_one(file, policy::golden_file(&policy, &golden)?, "--golden")?;
         talk::note(&format!(
             "{}: {answers} golden answers; name it in [network]: golden = \"{}\"",
             file.display(),

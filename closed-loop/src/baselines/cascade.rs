@@ -19,8 +19,8 @@ pub struct Cascade {
 
 /// Gains without delay and with one period of it: of the current, of the voltage, and the shares of both that are
 /// integrated each period. Found by random search for the least deviation and settling time on the paper's two plants
-/// (200 to 1000 W and back), rounded. A sample inside of the period
-/// counts as one of them; longer delays divide the gains by the periods.
+/// (200 to 1000 W and back), rounded. A sample inside of the period counts as one of them; longer
+/// delays divide the gains by the periods.
 const GAINS: [[f64; 4]; 2] = [[1.0, 0.8, 0.1, 0.2], [0.65, 0.28, 0.01, 0.1]];
 
 /// A PI regulator that stops integrating at its limits.

@@ -120,6 +120,10 @@ impl Design {
 
     /// How far the sampled current lies below its mean over the period, A.
     pub(crate) fn below_mean(&self) -> f64 {
+        // also where the duty at rest is 0 or 1, which has no ripple to divide
+        if self.phase == 0.0 {
+            return self.below_at_start();
+        }
         let rest = self.rest();
         let on = self.on(rest, 0.0, self.phase);
         // up by the whole ripple while the switch is on, down again for the others

@@ -65,8 +65,20 @@ pub struct Diagnosis {
 /// Diagnoses `model` by the records `train`; `heldout` only judges. `say` hears how far it is.
 #[must_use]
 pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say: Listener<'_>) -> Diagnosis {
+    diagnose_knowing(model, &[], train, heldout, say)
+}
+
+/// [`diagnose`], where the numbers of the model under the keys `certain` are known to be right: no cause changes them.
+#[must_use]
+pub fn diagnose_knowing(
+    model: &Parameters,
+    certain: &[String],
+    train: Vec<Record>,
+    heldout: &[Record],
+    say: Listener<'_>,
+) -> Diagnosis {
     let (model, standing) = &empirical::without_standing(model);
-    let base = Model::new(model);
+    let base = Model::new(model).knowing(certain);
     let (judges, unused) = without_captures(heldout);
     let heldout = &judges[..];
     // a second look begins with the records as they were read

@@ -2,7 +2,7 @@
 
 use crate::attribute::Attribution;
 use crate::balance;
-use crate::causes::Search;
+use crate::causes::{Candidate, Search};
 use crate::findings::Named;
 use crate::problem::Problem;
 use crate::profile::Profile;
@@ -27,6 +27,23 @@ fn is_cut_off([low, high]: [f64; 2], is_size: bool, value: f64) -> bool {
     // over a range of decades a share of it is far above its lower end
     let near_low = if low > 0.0 { near.min(AT_BOUND * low) } else { near };
     value > high - near || value < low + near_low && !is_natural
+}
+
+/// The values that are tried of parameter number `place`; nothing where they have no end: whole periods and counts have no range, and a
+/// phase comes round again.
+fn tried(candidate: &Candidate, place: usize) -> Option<[f64; 2]> {
+    let name = candidate.form.knobs.get(place)?.name;
+    let is_round = candidate.form.search == Search::Line && name == "phase";
+    let [low, high, _] = *candidate.ranges.get(place)?;
+    (candidate.form.is_smooth() && !is_round).then_some([low, high])
+}
+
+/// Whether one of the `values` of a candidate ends where it is cut off: then it is no explanation.
+pub fn is_at_bound(candidate: &Candidate, values: &[f64]) -> bool {
+    let at = |(place, value): (usize, &f64)| {
+        tried(candidate, place).is_some_and(|range| is_cut_off(range, place < candidate.sizes(), *value))
+    };
+    values.iter().enumerate().any(at)
 }
 
 /// A doubt.
@@ -66,12 +83,7 @@ pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], st
         let Some(candidate) = best.causes.get(member).map(|cause| &attribution.candidates[*cause]) else {
             continue;
         };
-        // whole periods and counts have no range, and a phase comes round again
-        let is_round = candidate.form.search == Search::Line && profile.name == "phase";
-        if !candidate.form.is_smooth() || is_round {
-            continue;
-        }
-        let Some([low, high, _]) = candidate.ranges.get(place).copied() else {
+        let Some([low, high]) = tried(candidate, place) else {
             continue;
         };
         let at = |value: f64| is_cut_off([low, high], place < candidate.sizes(), value);

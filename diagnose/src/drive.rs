@@ -8,6 +8,7 @@
 //! A row is a PWM period. Samples that come whole periods later are moved by rows; the rest is the plant's phase.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use measured::{DutyIs, Sampled};
 use plant::{Load, Parameters, Plant, Signals};
@@ -46,6 +47,8 @@ pub struct Model {
     pub plant: Parameters,
     /// How much later than stamped the samples were taken, s; negative for earlier.
     pub late: f64,
+    /// Keys of the plant file whose numbers are certain: no cause changes them.
+    pub certain: Arc<[String]>,
 }
 
 impl Model {
@@ -55,6 +58,16 @@ impl Model {
         Model {
             plant: plant.clone(),
             late: 0.0,
+            certain: Arc::default(),
+        }
+    }
+
+    /// The same with these keys of the plant file for certain.
+    #[must_use]
+    pub fn knowing(self, certain: &[String]) -> Self {
+        Model {
+            certain: certain.into(),
+            ..self
         }
     }
 

@@ -238,7 +238,8 @@ fn held_by_data(
     if !structure.is_empty() {
         return parabolas(problem, attribution);
     }
-    let others = crate::ties::other_pairs(problem, attribution, say);
+    let mut others = crate::ties::other_pairs(problem, attribution, say);
+    others.extend(crate::ties::pairs_for_one(problem, attribution, say));
     // they stand in the place of all causes together: said once, at the first
     for rivals in attribution.rivals.iter_mut().take(1) {
         rivals.extend(others.iter().cloned());

@@ -4,7 +4,9 @@ use plant::Load;
 use serde::Serialize;
 
 use crate::attribute::Attribution;
+use crate::causes::CAUSES;
 use crate::drive::Model;
+use crate::findings::{Findings, Named};
 use crate::fit::State;
 use crate::played::{FOLDER, Played};
 use crate::problem::Problem;
@@ -17,6 +19,9 @@ const ROWS: usize = 300;
 /// Separation from which on an experiment is worth doing: the three standard deviations within which two explanations are a tie. With less
 /// it would end in the same tie.
 const LEAST: f64 = 3.0;
+
+/// The cause that a column of the input voltage shows.
+const SOURCE: &str = "source_impedance";
 
 /// An experiment and what it would tell apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -67,6 +72,50 @@ pub fn experiments(problem: &Problem, attribution: &Attribution, say: Listener<'
         list.extend(scored.into_iter().take(2));
     }
     list
+}
+
+/// What breaks a tie beside the experiments, for a reader; nothing where there is no tie.
+#[must_use]
+pub fn advice(findings: &Findings) -> Option<String> {
+    let tied: Vec<&Named> = findings
+        .causes
+        .iter()
+        .filter(|cause| !cause.rivals.is_empty())
+        .collect();
+    if tied.is_empty() {
+        return None;
+    }
+    let rivals = tied.iter().flat_map(|cause| cause.rivals.iter().flatten().copied());
+    let mut ids: Vec<&str> = tied.iter().map(|cause| cause.id).chain(rivals).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    let has_v_in = findings.compared.channels.iter().any(|channel| *channel == "v_in");
+    let none = match findings.next_experiments.is_empty() {
+        true => "None of the experiments that are tried would break the tie.",
+        false => "",
+    };
+    let source = match ids.contains(&SOURCE) && !has_v_in {
+        true => " A column of the voltage at the converter's input (`v_in`) would show what the source does.",
+        false => "",
+    };
+    let key = |id: &&str| {
+        CAUSES.iter().find(|cause| cause.id == *id)?.forms[0].knobs[0]
+            .keys
+            .first()
+    };
+    let keys: Vec<String> = ids
+        .iter()
+        .filter_map(key)
+        .map(|key| format!("--certain {key}"))
+        .collect();
+    let certain = match keys.is_empty() {
+        true => String::new(),
+        false => format!(
+            " If you know one of these numbers of the model to be right, say so, and no cause changes it: {}.",
+            keys.join(", ")
+        ),
+    };
+    Some(format!("{none}{source}{certain}").trim_start().to_owned())
 }
 
 /// What a bench does for such a record.

@@ -15,6 +15,7 @@ use self::colours::{EXTENDED, MODEL};
 use crate::diagnosis::Diagnosis;
 use crate::findings::{Named, Verdict};
 use crate::gain::{Pair, Regime, Shift};
+use crate::next;
 use crate::noise::channel;
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS};
 use crate::timing;
@@ -212,12 +213,9 @@ fn profiles(diagnosis: &Diagnosis) -> Section {
 fn ties(diagnosis: &Diagnosis) -> Section {
     let findings = &diagnosis.findings;
     let section = Section::new("Ties and the next experiment");
+    let section = section.text(next::advice(findings).unwrap_or_else(|| "No tie to be broken.".to_owned()));
     if findings.next_experiments.is_empty() {
-        let is_tied = findings.causes.iter().any(|cause| !cause.rivals.is_empty());
-        return section.text(match is_tied {
-            true => "None of the experiments that are tried would break the tie.",
-            false => "No tie to be broken.",
-        });
+        return section;
     }
     let heading = "Separation: standard deviations between the two explanations, initial states free. The best experiment of \
                    each tie; all are in diagnosis.json, and the folder experiments has them period by period.";
@@ -388,5 +386,8 @@ fn detectable(diagnosis: &Diagnosis) -> Section {
             .into(),
         ]);
     }
-    Section::new("").details(Section::new("Not detectable").table(table))
+    match diagnosis.findings.not_detectable.is_empty() {
+        true => Section::new(""),
+        false => Section::new("").details(Section::new("Not detectable").table(table)),
+    }
 }

@@ -13,6 +13,7 @@ use crate::diagnosis::Diagnosis;
 use crate::extend::{extended_toml, partial_toml};
 use crate::findings::Findings;
 use crate::gain::Regime;
+use crate::next;
 use crate::page::comparison::{Compared, compared};
 use crate::page::page;
 use crate::played;
@@ -152,6 +153,7 @@ pub fn answer(columns: &ColumnMap, files: &[&Path], findings: &Findings) -> Vec<
     if let Some(term) = &findings.empirical {
         lines.push(format!("described, not explained: {}", term.sentence));
     }
+    lines.extend(next::advice(findings));
     lines.extend(findings.noise.repairs.iter().map(|repair| format!("note: {repair}")));
     if let Some(reason) = &findings.gain.closed_loop_missing {
         lines.push(format!(

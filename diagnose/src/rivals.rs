@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::attribute::Attribution;
 use crate::causes::{Kind, Knob};
+use crate::doubts;
 use crate::fit::Fit;
 use crate::problem::Problem;
 use crate::profile::Profile;
@@ -62,20 +63,25 @@ fn interval(attribution: &Attribution, fit: &Fit, number: usize, [low, high, _]:
 }
 
 /// Among members of a tie that the data cannot put in order the more usual one leads: copper and diode before the gain of a probe.
-/// What it replaces becomes its rival.
+/// What it replaces becomes its rival. A member that ends at the limit of what is tried leads nothing that another explains as well:
+/// it is no explanation, and no rival either.
 pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution) {
     let members = attribution.best.as_ref().map_or(0, |best| best.causes.len());
     for member in 0..members {
         let Some(best) = &attribution.best else { return };
         let own = attribution.usual(best, best.causes[member]);
-        let worst = best.state.chi2 + LEVEL * attribution.inflation;
+        // a rival lies within a tie, whatever a member gains that may not go on
+        let worst = match own.is_at_bound {
+            true => f64::INFINITY,
+            false => best.state.chi2 + LEVEL * attribution.inflation,
+        };
         let kept: Vec<usize> = without(&best.causes, member);
         let leads = |fit: &&Fit| {
             // the rival of one cause stands last, behind those that are kept
             let other = fit.causes.last().map(|cause| attribution.usual(fit, *cause));
             fit.causes.len() == kept.len() + 1
                 && fit.causes[..kept.len()] == kept
-                && other.is_some_and(|kind| kind < own)
+                && other.is_some_and(|other| other < own)
                 && fit.state.chi2 <= worst
                 && structures(problem, &attribution.null, &fit.state, attribution.inflation).is_empty()
         };
@@ -83,7 +89,7 @@ pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution) {
         let Some(leader) = found.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2)).cloned() else {
             continue;
         };
-        attribution.lead(member, leader);
+        attribution.lead(member, leader, own.is_at_bound);
         // the others have moved a place
         return most_usual_first(problem, attribution);
     }
@@ -93,32 +99,49 @@ pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution) {
 /// differ by less, and converters of 400 V have other resistances than those of 5 V.
 const UNTYPICAL: f64 = 5.0;
 
+/// How usual a cause with its values is, the most usual first.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Usual {
+    is_at_bound: bool,
+    is_untypical: bool,
+    kind: Kind,
+}
+
 impl Attribution {
-    /// How usual a cause is in a fit, the most usual first: whether one of its numbers is beyond what is typical, then its kind.
-    fn usual(&self, fit: &Fit, cause: usize) -> (bool, Kind) {
+    fn usual(&self, fit: &Fit, cause: usize) -> Usual {
         let candidate = &self.candidates[cause];
         let before: usize = (fit.causes.iter().take_while(|known| **known != cause))
             .map(|known| self.candidates[*known].own.len())
             .sum();
-        let own = fit.values[before..]
+        let values: Vec<f64> = fit
+            .values
             .iter()
-            .zip(&candidate.own)
-            .zip(candidate.form.knobs);
+            .skip(before)
+            .take(candidate.own.len())
+            .copied()
+            .collect();
+        let mut own = values.iter().zip(&candidate.own).zip(candidate.form.knobs);
         let is_untypical = |((value, model), knob): ((&f64, &f64), &Knob)| {
             let parameter = knob.keys.first().and_then(|key| plant::parameter(key));
             let most = parameter.map_or(f64::INFINITY, |parameter| parameter.typical.1.abs());
             value.abs() > UNTYPICAL * most.max(model.abs())
         };
-        (own.into_iter().any(is_untypical), candidate.cause.kind)
+        Usual {
+            is_at_bound: doubts::is_at_bound(candidate, &values),
+            is_untypical: own.any(is_untypical),
+            kind: candidate.cause.kind,
+        }
     }
 
-    /// Puts `leader`, a rival of `member`, in the place of the best; its new cause stands last.
-    fn lead(&mut self, member: usize, leader: Fit) {
+    /// Puts `leader`, a rival of `member`, in the place of the best, which becomes a rival unless it `is_out`; its new cause stands
+    /// last.
+    fn lead(&mut self, member: usize, leader: Fit, is_out: bool) {
         let Some(best) = self.best.take() else { return };
         let same = |fit: &Fit| fit.causes == leader.causes;
         let mut rivals = without(&self.rivals, member);
         let others = self.rivals[member].iter().filter(|fit| !same(fit)).cloned();
-        rivals.push(std::iter::once(best.clone()).chain(others).collect());
+        let before = (!is_out).then(|| best.clone());
+        rivals.push(before.into_iter().chain(others).collect());
         let mut evidence = without(&self.evidence, member);
         evidence.push(self.evidence[member] - (leader.state.chi2 - best.state.chi2));
         (self.rivals, self.evidence, self.best) = (rivals, evidence, Some(leader));

@@ -1,11 +1,13 @@
 //! Explanations that share no cause with the leading one and fit as well.
 
 use crate::attribute::Attribution;
+use crate::doubts;
 use crate::fit::{Fit, Fitter};
 use crate::parallel;
 use crate::problem::{Problem, axpy, dot};
 use crate::progress::{self, Listener};
 use crate::search::{self, gained};
+use crate::shape::structures;
 
 /// As for rivals of one cause: chi-square within three standard deviations of one parameter, times the scatter, or this share of
 /// what is explained. The share is fifty times that for rivals of one cause, since nothing of the leading pair is kept. A convention in
@@ -27,6 +29,10 @@ const NEEDED: f64 = 4.0;
 /// cause: conventions for time, and for what first order does not show.
 const MOST_IN_PART: usize = 4;
 const NEAR: f64 = 5.0;
+
+/// Causes that lead a pair in the place of one, and causes that are fitted beside each. Conventions for time.
+const LEADERS: usize = 3;
+const SECONDS: usize = 3;
 
 /// What may stand in the place of one parameter of a cause that has several, with other values of the rest: for each the member of the
 /// leading explanation and the fit, with that parameter at the model's own value.
@@ -97,6 +103,78 @@ pub fn in_part(problem: &Problem, attribution: &Attribution, say: Listener<'_>) 
         (fit.state.chi2 <= best.state.chi2 + tie).then_some((*member, fit))
     });
     fits.into_iter().flatten().collect()
+}
+
+/// Pairs that may stand in the place of one cause of several numbers, and need no more of them; the best first.
+///
+/// An input capacitor shapes what the resistance of its source does, and does as well what a winding and a little error of the inductance do
+/// together. Each pair begins with a cause that explains much alone.
+#[must_use]
+pub fn pairs_for_one(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> Vec<Fit> {
+    let is_shaped = |best: &&Fit| best.causes.len() == 1 && best.values.len() > 1;
+    let Some(best) = attribution.best.as_ref().filter(is_shaped) else {
+        return Vec::new();
+    };
+    let explained = attribution.null.chi2 - best.state.chi2;
+    let tie = (TIE * attribution.inflation).max(search::TIE_SHARE * explained);
+    let is_tied = |fit: &Fit| fit.state.chi2 <= best.state.chi2 + tie;
+    let is_open = |fit: &&Fit| {
+        let is_other = fit.causes.iter().all(|cause| !attribution.same(*cause, best.causes[0]));
+        // what does as well alone is a rival already; by its share of what is explained it may be near and still leave structure
+        let is_rival = attribution
+            .rivals
+            .iter()
+            .flatten()
+            .any(|rival| rival.causes == fit.causes);
+        is_other && fit.values.len() < best.values.len() && !is_rival
+    };
+    let mut leaders: Vec<&Fit> = attribution.singles.iter().filter(is_open).collect();
+    leaders.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+    leaders.truncate(LEADERS);
+    let mut looks = Vec::new();
+    for leader in leaders {
+        let basis = problem.basis(&leader.state.model, &leader.state.starts, &leader.state.residual);
+        let fitter = Fitter {
+            basis: &basis,
+            ..attribution.fitter(problem)
+        };
+        let is_second = |cause: &usize| {
+            let numbers = attribution.candidates[*cause].own.len() + leader.values.len();
+            let is_own = |known: &usize| attribution.same(*known, *cause);
+            let (form, others) = (attribution.candidates[*cause].form, [leader.causes[0], best.causes[0]]);
+            numbers <= best.values.len() && form.begins_at_own() && !others.iter().any(is_own)
+        };
+        let seconds: Vec<usize> = (0..attribution.candidates.len()).filter(is_second).collect();
+        let own = fitter.sensitivity(leader.causes[0], &leader.state);
+        let gains = parallel::map(&seconds, |cause| {
+            let columns = [own.clone(), fitter.sensitivity(*cause, &leader.state)].concat();
+            gained(&columns, &leader.state.residual)
+        });
+        let mut own: Vec<(f64, &Fit, usize)> = gains
+            .into_iter()
+            .zip(&seconds)
+            .map(|(gain, cause)| (leader.state.chi2 - gain, leader, *cause))
+            .filter(|(chi2, ..)| *chi2 <= best.state.chi2 + NEAR * tie)
+            .collect();
+        own.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+        looks.extend(own.into_iter().take(SECONDS));
+    }
+    let fitter = attribution.fitter(problem);
+    let mut fits = progress::map(say, "pairs of causes for one", &looks, |(_, leader, second)| {
+        let values = [&leader.values[..], &attribution.candidates[*second].own].concat();
+        fitter.from(&[leader.causes[0], *second], &values, &leader.state)
+    });
+    let is_at_bound = |fit: &Fit| {
+        let split = attribution.candidates[fit.causes[0]].own.len().min(fit.values.len());
+        let (first, second) = fit.values.split_at(split);
+        let ends = [(fit.causes[0], first), (fit.causes[1], second)];
+        ends.iter()
+            .any(|(cause, values)| doubts::is_at_bound(&attribution.candidates[*cause], values))
+    };
+    let leaves = |fit: &Fit| structures(problem, &attribution.null, &fit.state, attribution.inflation);
+    fits.retain(|fit| is_tied(fit) && !is_at_bound(fit) && leaves(fit).is_empty());
+    fits.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+    fits
 }
 
 /// Pairs of causes beside a leading pair with which they have nothing in common; the best first.

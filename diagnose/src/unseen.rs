@@ -22,11 +22,18 @@ pub fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
     for (cause, smallest) in sizes {
         let candidate = &attribution.candidates[cause];
         let knob = &candidate.form.knobs[0];
+        // what may stand in the place of a cause is seen, though not beside it
+        let is_rival = attribution
+            .rivals
+            .iter()
+            .flatten()
+            .flat_map(|fit| &fit.causes)
+            .any(|one| attribution.same(*one, cause));
         // one parameter of several forms is one parameter
         let is_listed = list
             .iter()
             .any(|one| (one.id, one.parameter) == (candidate.cause.id, knob.name));
-        if is_listed || !conducts(&attribution.state().model.plant, knob.keys) {
+        if is_rival || is_listed || !conducts(&attribution.state().model.plant, knob.keys) {
             continue;
         }
         let reach = candidate.reach();

@@ -383,6 +383,9 @@ pub struct Diagnose {
     /// Each row is a settled operating point, whatever else the records hold
     #[arg(long)]
     pub settled: bool,
+    /// Numbers of the plant file that you know to be right, by key: `inductor.dcr,source.resistance`. No cause changes them
+    #[arg(long, value_name = "KEY,KEY", value_delimiter = ',')]
+    pub certain: Vec<String>,
     /// policy.toml with a mapping, or the folder that holds it: its mapping is refitted from the extended model, and the
     /// loop closed on that model with both. With --retrain one without a mapping will do
     #[arg(long, value_name = "POLICY")]

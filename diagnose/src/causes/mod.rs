@@ -143,6 +143,13 @@ impl Candidate {
         keys.all(|key| EDGES.contains(key)) && !self.form.knobs[0].keys.is_empty()
     }
 
+    /// Whether it changes one of these numbers of the plant file.
+    #[must_use]
+    pub fn changes(&self, keys: &[String]) -> bool {
+        let mut own = self.form.knobs.iter().flat_map(|knob| knob.keys);
+        own.any(|key| keys.iter().any(|one| one == key))
+    }
+
     /// Starts that are given in steps of its parameters: above the model's value, or of several parameters as they are.
     pub(crate) fn in_steps(&self, list: &[&[f64]]) -> Vec<Vec<f64>> {
         let absolute = self.own.len() > 1;

@@ -8,7 +8,7 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use ::diagnose::control::Request;
-use ::diagnose::diagnosis::{Diagnosis, diagnose};
+use ::diagnose::diagnosis::{Diagnosis, diagnose_knowing};
 use ::diagnose::played;
 use ::diagnose::progress::Progress;
 use ::diagnose::record::{Record, open_all};
@@ -136,9 +136,24 @@ pub fn check(options: &Diagnose) -> Result<(), Failure> {
     if let Some(policy) = &options.policy {
         request(options, policy, &model)?;
     }
+    known_keys(&options.certain)?;
     retrain::prepare(options)?;
     records(options, &columns(options)?, &model)?;
     Ok(())
+}
+
+/// Keys of `--certain` are those of a plant file.
+fn known_keys(certain: &[String]) -> Result<(), Faults> {
+    let keys: Vec<&str> = plant::parameters().map(|parameter| parameter.key).collect();
+    let unknown = certain.iter().find(|key| !keys.contains(&key.as_str()));
+    unknown.map_or(Ok(()), |key| {
+        let expected = "keys of a plant file with their tables, such as inductor.dcr";
+        let message = Message::new(format!("unknown key `{}` in --certain", key.escape_debug()));
+        Err(message
+            .expected(expected)
+            .did_you_mean(key, keys.iter().copied())
+            .into())
+    })
 }
 
 /// The model; a mapping is refitted for the buck alone.
@@ -165,12 +180,13 @@ fn asked(options: &Diagnose) -> Asked {
         .into_iter()
         .filter_map(|(name, file)| Some((name, path(file.as_ref()?))));
     let settled = options.settled.then(|| ("--settled", String::new()));
+    let certain = (!options.certain.is_empty()).then(|| ("--certain", options.certain.join(",")));
     Asked {
         model: path(&options.model),
         train: options.train.iter().map(path).collect(),
         heldout: options.heldout.iter().map(path).collect(),
         map: options.columns.map.clone(),
-        others: given.chain(settled).collect(),
+        others: given.chain(settled).chain(certain).collect(),
     }
 }
 
@@ -189,6 +205,7 @@ fn columns(options: &Diagnose) -> Result<ColumnMap, Failure> {
 
 fn found(options: &Diagnose, columns: &ColumnMap, say: &(dyn Fn(Progress<'_>) + Sync)) -> Result<Diagnosis, Failure> {
     let model = model(options)?;
+    known_keys(&options.certain)?;
     let closed_loop = options
         .policy
         .as_deref()
@@ -198,7 +215,7 @@ fn found(options: &Diagnose, columns: &ColumnMap, say: &(dyn Fn(Progress<'_>) + 
     let reading = Working::new("reading the records");
     let (train, heldout) = records(options, columns, &model)?;
     drop(reading);
-    let mut diagnosis = diagnose(&model, train, &heldout, say);
+    let mut diagnosis = diagnose_knowing(&model, &options.certain, train, &heldout, say);
     diagnosis.keep_text(&FileName::from(&options.model));
     if let Some(request) = closed_loop {
         say(Progress::Stage("closed loop"));

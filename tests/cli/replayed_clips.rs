@@ -42,6 +42,14 @@ fn an_end_of_the_contract_is_kept_only_where_the_log_stays_within_it() {
     );
 }
 
+/// Without a filter nothing remembers how an episode began: what differs there alone differs for another reason.
+#[test]
+fn a_clip_that_cuts_first_rows_alone_is_no_start_of_a_filter() {
+    let (code, line) = said_with("scale = 1.0\nclip = [-3.0, 3.0]", cut(1.0, -OPEN, OPEN));
+    assert_eq!(code, 1, "{line}");
+    assert!(line.contains("clip") && !line.contains("--skip"), "{line}");
+}
+
 #[test]
 fn the_clip_of_a_log_with_another_scale_is_told_with_it() {
     is_told(

@@ -119,6 +119,13 @@ fn first_rows_of_episodes_can_be_left_out() {
     );
     let (code, told) = said(&text, &format!("{REPLAY} --skip 1"));
     assert_eq!(code, Some(0), "{told}");
+    assert!(told.contains("2 rows of them left out"), "{told}");
+    // a column of the duty before hides nothing of it
+    let text = log(",previous_duty,obs_d", |row| format!(",{0},{0}", before(row)));
+    let (code, told) = said(&text, REPLAY);
+    assert!(code == Some(1) && told.contains("look at initial_duty"), "{told}");
+    let (code, told) = said(&text, &format!("{REPLAY} --skip 1"));
+    assert_eq!(code, Some(0), "{told}");
 }
 
 #[test]

@@ -34,6 +34,9 @@ fn replay_in_integers_counts_what_the_format_changes_apart_from_a_wrong_contract
     desk.write("log.csv", &log_with_actions(&desk));
     let said = desk.succeed("replay buck12 log.csv");
     assert!(said.contains("action equal in 120 of 120"), "{said}");
+    // what a format changes is said where it is little, too
+    let wide = desk.type_in("replay buck12 log.csv --format i16").stdout;
+    assert!(wide.contains("decisions in i16: "), "{wide}");
     let refused = desk.type_in("replay buck12 log.csv --format i8");
     assert_eq!(refused.code, Some(1), "{}", refused.stdout);
     for words in [

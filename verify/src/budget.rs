@@ -131,7 +131,8 @@ impl Budget {
             [] => "",
             _ => ", and compute_delay = 1 in the contract",
         };
-        (self.fit != Fit::Missed && most > HALF).then(|| match most < 1.0 {
+        // what is left in whole percent, or there is no instant to be named
+        (self.fit != Fit::Missed && most > HALF).then(|| match most < 0.99 {
             true => format!(
                 "  note: a step takes up to {:.0} % of the period. Sampled within the first {:.0} % of it, the duty acts from the next start on; \
                  later, it can miss that start and act one period later, and the training has to have had that: pwm.duty_delay = 1 in the \

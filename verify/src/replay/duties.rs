@@ -148,11 +148,17 @@ fn rounding(logged: impl Iterator<Item = f64> + Clone, mut commanded: impl Itera
 }
 
 /// The duty before each row, as the log has it: `None` where it does not say. A law may read it, and what an action adds shows only
-/// where the law began at the log's.
+/// where the law began at the log's. Before the first row of an episode the contract's `initial_duty` stands: the log is held
+/// against it.
 pub(super) fn before(of: Logged<'_>) -> Vec<Option<f64>> {
     let log = of.log;
     if let Some(duties) = &of.done.previous_duty {
-        return duties.iter().copied().map(Some).collect();
+        let begins = log.begins.iter().copied().chain(std::iter::repeat(false));
+        return duties
+            .iter()
+            .zip(begins)
+            .map(|(duty, begins)| (!begins).then_some(*duty))
+            .collect();
     }
     let mut list = vec![None; log.rows()];
     if let (Head::Residual(head), Some((_, _, pairs))) = (of.path.head, pairs(of)) {

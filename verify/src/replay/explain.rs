@@ -249,7 +249,13 @@ pub(super) fn explain(
     let own = course.features.get(index)?;
     let logged = Logged::new(feature, &own.observation, values, tolerance);
     let trial = Trial::new(policy, feature, own, course, &logged);
-    if let Some(text) = starts(feature, course, own, &logged) {
+    // only what remembers something begins in another way
+    let duties = policy
+        .paths()
+        .iter()
+        .any(|path| feature.source.reads(path.previous_duty));
+    let remembers = duties || !feature.filters.is_empty();
+    if let Some(text) = starts(feature, course, own, &logged).filter(|_| remembers) {
         return Some(text);
     }
     // before a line: an integral that leaves out its first sample is off by a constant, and by another in each episode
@@ -306,7 +312,9 @@ fn starts(feature: &Feature, course: &Course, own: &FeatureCourse, logged: &Logg
     let longest = ages.iter().copied().max()?;
     (last < START && longest > 2 * last + 2).then(|| {
         if last == 0 && feature.filters.is_empty() {
-            return "it differs only in the first row of an episode: the training has another duty before it; look at initial_duty".to_owned();
+            return "it differs only in the first row of an episode: the training has another duty before it; look at initial_duty, or, where the log \
+                    begins in mid-run, leave the row out: --skip 1"
+                .to_owned();
         }
         let rows = if last == 0 { "row".to_owned() } else { format!("{} rows", last + 1) };
         let skip = last + 1;

@@ -47,6 +47,8 @@ pub const TOLERANCE: f64 = 1e-4;
 pub struct Replay {
     /// Control periods in the log.
     pub rows: usize,
+    /// Of these, rows at the start of episodes that were not compared, as asked for.
+    pub skipped: usize,
     /// Fresh starts in it, the first included.
     pub episodes: usize,
     /// One entry per feature, in the order of the network's inputs.
@@ -204,7 +206,8 @@ pub struct Wanted {
 pub fn replay(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faults> {
     let mut replay = compared(policy, log, wanted)?;
     replay.late = late::column(policy, log, wanted, &replay);
-    if replay.late.is_none() && !replay.equal() {
+    // what an integer format changes is said where it changes nothing, too
+    if replay.late.is_none() {
         replay.format = answers::changed(policy, log, wanted)?;
     }
     Ok(replay)
@@ -270,6 +273,12 @@ fn compared(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faults
     }
     Ok(Replay {
         rows: log.rows(),
+        skipped: log
+            .is_late(0)
+            .iter()
+            .zip(&late)
+            .filter(|(all, late)| all != late)
+            .count(),
         episodes: log.begins.iter().filter(|begins| **begins).count(),
         features,
         actions: one.0,

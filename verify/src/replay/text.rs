@@ -24,6 +24,10 @@ pub fn text(policy: &Policy, replay: &Replay) -> String {
             counted(replay.episodes, "episode")
         );
     }
+    if replay.skipped > 0 {
+        out.truncate(out.trim_end().len());
+        out += &format!("; {} of them left out\n\n", counted(replay.skipped, "row"));
+    }
     let width = replay.features.iter().map(|feature| feature.name.chars().count());
     let width = width.max().unwrap_or(0).max("feature".len());
     out += &format!(

@@ -148,6 +148,11 @@ impl Record {
             repairs: raw.repairs.clone(),
         };
         let labels = QUANTITIES.map(|name| raw.label(name));
+        if let Some(v_in) = map.constant("v_in") {
+            record.repairs.push(format!(
+                "v_in = {v_in}, a number, is what the source was set to: nothing measured it, and its resistance may still be a cause"
+            ));
+        }
         record.report_holes(&labels);
         record.leave_out_stuck(&labels);
         record.leave_out_clipped(&labels);

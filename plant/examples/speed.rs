@@ -85,8 +85,8 @@ fn side_by_side(name: &str, parameters: &Parameters) -> Result<(), Faults> {
                 (0..COUNT).for_each(|index| batch.reset_at(index, 100.0, 1.0, &loads[index]));
             }
             batch.step(&duties, &loads);
-            for index in 0..COUNT {
-                std::hint::black_box(batch.measured(index, &loads[index]));
+            for (index, load) in loads.iter().enumerate() {
+                std::hint::black_box(batch.measured(index, load));
             }
         }
         STEPS * COUNT as u32

@@ -31,8 +31,8 @@ impl Lane {
     /// `other` where `mask` is 0.
     #[inline(always)]
     pub fn or(mut self, mask: &Mask, other: Lane) -> Self {
-        for n in 0..LANES {
-            self.0[n] = if mask[n] == 0 { other.0[n] } else { self.0[n] };
+        for (own, (mask, other)) in self.0.iter_mut().zip(mask.iter().zip(&other.0)) {
+            *own = if *mask == 0 { *other } else { *own };
         }
         self
     }

@@ -38,11 +38,14 @@ pub struct Scoring<'a> {
     count: f64,
 }
 
+/// How to read a figure.
+type Read = fn(&Metrics) -> f64;
+
 /// A figure that is limited.
 #[derive(Debug, Clone, Copy)]
 struct Limited {
     instants: Instants,
-    figure: fn(&Metrics) -> f64,
+    figure: Read,
     limit: f64,
 }
 
@@ -99,9 +102,8 @@ impl<'a> Scoring<'a> {
     fn limits(&self, index: usize, margin: f64) -> Vec<Limited> {
         if self.specification.is_empty() {
             // conventions: twice the paper's 5 V and 5 ms, and what its bench had left without a mapping
-            let usual: [(fn(&Metrics) -> f64, f64); 3] =
-                [(|m| m.deviation, 10.0), (|m| m.settling, 1e-2), (|m| m.tail_max, 1.0)];
-            let limited = |(figure, limit): (fn(&Metrics) -> f64, f64)| Limited {
+            let usual: [(Read, f64); 3] = [(|m| m.deviation, 10.0), (|m| m.settling, 1e-2), (|m| m.tail_max, 1.0)];
+            let limited = |(figure, limit): (Read, f64)| Limited {
                 instants: Instants::Worst,
                 figure,
                 limit: limit * margin,
@@ -145,9 +147,9 @@ pub fn figures(metrics: &Metrics, requirement: &Requirement) -> Vec<(&'static st
 }
 
 /// What a requirement limits: the limit's key, how to read the figure, and the limit.
-fn limits(requirement: &Requirement) -> impl Iterator<Item = (&'static str, fn(&Metrics) -> f64, f64)> {
+fn limits(requirement: &Requirement) -> impl Iterator<Item = (&'static str, Read, f64)> {
     let limits = &requirement.limits;
-    let all: [(&str, fn(&Metrics) -> f64, Option<f64>); 6] = [
+    let all: [(&str, Read, Option<f64>); 6] = [
         ("deviation", |m| m.deviation, limits.deviation),
         ("settling", |m| m.settling, limits.settling),
         ("tail", |m| m.tail_max, limits.tail),

@@ -47,6 +47,13 @@ const POLE: f64 = 0.5;
 // of 0, .3 and .5, with L and C 15 % low: 0 drives an estimate that is wrong too far (a buck-boost deviates by 2 to 3 % more), and
 // .5 gives away 7 % on a boost whose current rises within a period
 const CURRENT_POLE: f64 = 0.3;
+/// The same where full effort takes more than [`LONG_EFFORT`] control periods.
+// while it lasts the output says little of the current, and parts that are not those of the print make an error that grows with it. On
+// examples/plants/buck-boost-12-24.toml, worst of L and C 15 % low, as printed and 15 % high, each over its own limit: 1.20 at .3,
+// 1.16 at .5, 1.19 at .6. Of 3,600 laws with other gains of observer and law, found by a random search, none was below 1.14
+const SLOW_CURRENT_POLE: f64 = 0.5;
+/// Control periods in which the source alone raises the current to that of the largest load.
+const LONG_EFFORT: f64 = 3.0;
 
 /// An observer and a law for a plant.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,6 +88,7 @@ impl Design {
         nominal.compute_delay = compute_delay(plant, &nominal)?;
         let usual = match nominal.topology {
             Topology::Buck => POLE,
+            Topology::Boost | Topology::BuckBoost if nominal.effort() > LONG_EFFORT => SLOW_CURRENT_POLE,
             Topology::Boost | Topology::BuckBoost => CURRENT_POLE,
         };
         let pole = wanted.pole.unwrap_or(usual);

@@ -32,8 +32,8 @@ impl Modulator {
     #[inline(always)]
     pub fn duties(&self, commanded: &[f64]) -> Lane {
         let mut duty = Lane::of(0.0);
-        for n in 0..LANES {
-            duty.0[n] = if commanded[n] > 0.0 { commanded[n].min(1.0) } else { 0.0 };
+        for (duty, commanded) in duty.0.iter_mut().zip(commanded) {
+            *duty = if *commanded > 0.0 { commanded.min(1.0) } else { 0.0 };
         }
         if !self.exact {
             for n in 0..LANES {
@@ -67,10 +67,10 @@ impl Drawn {
     #[inline(always)]
     pub fn of(&self, loads: &[Load]) -> [Lane; 3] {
         let (mut conductance, mut current, mut power) = (Lane::of(0.0), Lane::of(0.0), Lane::of(0.0));
-        for n in 0..LANES {
-            conductance.0[n] = loads[n].conductance;
-            current.0[n] = loads[n].current;
-            power.0[n] = loads[n].power;
+        for (n, load) in loads.iter().take(LANES).enumerate() {
+            conductance.0[n] = load.conductance;
+            current.0[n] = load.current;
+            power.0[n] = load.power;
         }
         [
             conductance * self.resistor_gain + self.bleed,

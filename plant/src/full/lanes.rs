@@ -239,8 +239,8 @@ impl<'a> Lanes<'a> {
             if rest.is_none() {
                 ended = stopped;
                 if ended != [0; LANES] {
-                    for n in 0..LANES {
-                        self.regular[n] &= 1 - (ended[n] & group.starts[n]);
+                    for (regular, (ended, starts)) in self.regular.iter_mut().zip(ended.iter().zip(&group.starts)) {
+                        *regular &= 1 - (ended & starts);
                     }
                     // the same interval once more
                     rest = Some((h - used).or(&ended, Lane::of(0.0)));
@@ -383,12 +383,12 @@ impl<'a> Lanes<'a> {
     /// Lanes of `takes` in which the voltage is not the root that was taken are not regular.
     #[inline(always)]
     fn agree(&mut self, algebra: &Algebra, takes: &Mask) {
-        for n in 0..LANES {
+        for (n, takes) in takes.iter().enumerate() {
             let v = algebra.v_out.0[n];
             // without constant power the quotient may be negative, which is not the root
             let known =
                 (algebra.square.0[n] > 0.0) & (v > 0.0) & ((self.power.0[n] == 0.0) | (v >= self.group.v_fold.0[n]));
-            self.regular[n] &= u64::from(known | (takes[n] == 0));
+            self.regular[n] &= u64::from(known | (*takes == 0));
         }
     }
 }

@@ -58,8 +58,8 @@ impl Search {
             self.low[at] = self.high[at].or(&turned, halved[at]).or(&active, self.low[at]);
         }
         self.high = [self.length.or(&active, self.high[0]), left.or(&active, self.high[1])];
-        for n in 0..LANES {
-            active[n] &= u64::from(left.0[n].abs() >= 1e-13);
+        for (active, left) in active.iter_mut().zip(&left.0) {
+            *active &= u64::from(left.abs() >= 1e-13);
         }
         self.guess(active);
         false
@@ -70,10 +70,11 @@ impl Search {
     fn guess(&mut self, mut active: Mask) {
         let (low, high) = (self.low, self.high);
         let guess = low[0] + (high[0] - low[0]) * low[1] / (low[1] - high[1]);
-        for n in 0..LANES {
+        for (n, active) in active.iter_mut().enumerate() {
             let (from, to, at) = (low[0].0[n], high[0].0[n], guess.0[n]);
             let inside = (at > from.min(to)) & (at < from.max(to)) & ((to - from).abs() >= 1e-15 * self.step.0[n]);
-            active[n] &= u64::from(inside & (self.turns < 40));
+            // as often as `full::crossing`
+            *active &= u64::from(inside & (self.turns < 40));
         }
         self.turns += 1;
         self.length = guess.or(&active, high[0]).or(&self.crossed, self.step);

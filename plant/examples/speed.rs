@@ -1,4 +1,5 @@
-//! Control steps per second on one core: `cargo run --release -p policyc-plant --example speed`.
+//! Control steps per second on one core: `cargo run --release -p policyc-plant --example speed`. Words behind `--` leave out circuits
+//! whose name has none of them.
 
 use std::time::Instant;
 
@@ -29,7 +30,14 @@ fn main() -> Result<(), Faults> {
     single("with ESR and cable of 50 kHz", &cable, 200.0)?;
     single("with ESR and cable of 160 kHz", &short, 200.0)?;
     side_by_side("side by side, ideal", &Parameters::paper_model())?;
-    side_by_side("side by side, sb3-buck12", &sb3)
+    side_by_side("side by side, sb3-buck12", &sb3)?;
+    side_by_side("side by side, with ESR", &esr)?;
+    side_by_side("side by side, with all of that", &bench)
+}
+
+fn is_asked(name: &str) -> bool {
+    let mut words = std::env::args().skip(1).peekable();
+    words.peek().is_none() || words.any(|word| name.contains(&word))
 }
 
 /// Fastest of many short runs, so that other programs on the machine do not count.
@@ -42,6 +50,9 @@ fn fastest(mut run: impl FnMut() -> u32) -> f64 {
 }
 
 fn single(name: &str, parameters: &Parameters, power: f64) -> Result<(), Faults> {
+    if !is_asked(name) {
+        return Ok(());
+    }
     let mut plant = Plant::new(parameters)?;
     let load = Load::power(power);
     let duty = plant.settle(100.0, &load).duty;
@@ -61,6 +72,9 @@ fn single(name: &str, parameters: &Parameters, power: f64) -> Result<(), Faults>
 }
 
 fn side_by_side(name: &str, parameters: &Parameters) -> Result<(), Faults> {
+    if !is_asked(name) {
+        return Ok(());
+    }
     const COUNT: usize = 32;
     let mut batch = Batch::new(&vec![parameters.clone(); COUNT])?;
     let (duties, loads) = (vec![0.5; COUNT], vec![Load::power(200.0); COUNT]);
@@ -68,10 +82,12 @@ fn side_by_side(name: &str, parameters: &Parameters) -> Result<(), Faults> {
         const STEPS: u32 = 200;
         for n in 0..STEPS {
             if n % 100 == 0 {
-                (0..COUNT).for_each(|index| batch.reset_at(index, 100.0, 1.0));
+                (0..COUNT).for_each(|index| batch.reset_at(index, 100.0, 1.0, &loads[index]));
             }
             batch.step(&duties, &loads);
-            std::hint::black_box(batch.v_out());
+            for (index, load) in loads.iter().enumerate() {
+                std::hint::black_box(batch.measured(index, load));
+            }
         }
         STEPS * COUNT as u32
     });

@@ -19,6 +19,7 @@
 mod affine;
 mod algebra;
 mod few;
+pub(crate) mod lanes;
 
 use serde::{Deserialize, Serialize};
 

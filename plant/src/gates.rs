@@ -162,6 +162,13 @@ impl Gates {
         }
     }
 
+    /// Whether what came before says nothing of the next period.
+    pub fn owe_nothing(&self) -> bool {
+        [&self.upper, &self.lower_off]
+            .iter()
+            .all(|train| train.owed.1 <= train.owed.0 && !train.high_at_end)
+    }
+
     /// The first edge after `t` and before `limit`, else `limit`.
     pub fn next_edge(&self, timing: &GateTiming, t: f64, limit: f64) -> f64 {
         let next = self.upper.next_edge(t, limit);

@@ -121,6 +121,12 @@ impl Legs {
         &self.paths[if on { 0 } else { 1 }]
     }
 
+    /// The paths with the main switch off: diode, second switch, body diode of the main switch.
+    pub fn off(&self) -> [Path; 3] {
+        let [_, second, diode, body] = self.paths;
+        [diode, second, body]
+    }
+
     /// The mean of the paths over a period (equation 2 of the paper, with losses; CCM).
     pub fn averaged(&self, duty: f64) -> Path {
         // a switch that stays off or on has no edges, and so loses no duty

@@ -12,7 +12,7 @@
 //! ```
 //!
 //! - [`Parameters`] say what the converter is made of, [`effects`] what each of them means and may be.
-//! - [`Plant::step`] goes from sampling instant to sampling instant, [`Batch`] does so for many ideal converters at once.
+//! - [`Plant::step`] goes from sampling instant to sampling instant, [`Batch`] does so for many plain converters at once.
 //! - [`Parameters::from_toml`] reads a `plant.toml`.
 //!
 //! No function of the machine's libm is used but the square root, which is exact; the exponential is that of the libm crate, which is
@@ -26,6 +26,7 @@ mod entry;
 mod full;
 mod gates;
 mod lag;
+mod lane;
 mod legs;
 mod parameters;
 mod plain;

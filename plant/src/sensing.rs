@@ -96,6 +96,18 @@ impl Sensing {
         now
     }
 
+    /// The next number of a sensor's noise.
+    #[inline]
+    pub fn noise(&self, memory: &mut Memory, channel: usize) -> f64 {
+        let noise = self.sensors[channel].noise;
+        // a sensor without noise draws nothing, so that it does not move the noise of the others
+        if noise > 0.0 {
+            noise * memory.noise.normal()
+        } else {
+            0.0
+        }
+    }
+
     /// What the sensors show at the sampling instant.
     pub fn show(&self, memory: &mut Memory, true_signals: &Signals, filtered: [f64; CHANNELS]) -> Signals {
         if self.ideal {
@@ -107,9 +119,8 @@ impl Sensing {
                 now[n] = memory.history[n][kept];
             }
             let mut value = sensor.gain * now[n] + sensor.offset;
-            // a sensor without noise draws nothing, so that it does not move the noise of the others
             if sensor.noise > 0.0 {
-                value += sensor.noise * memory.noise.normal();
+                value += self.noise(memory, n);
             }
             now[n] = sensor_quantisation::round(value, sensor.lsb);
         }

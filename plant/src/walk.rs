@@ -17,7 +17,7 @@ use crate::signals::{Load, Sample, Signals};
 
 /// Two instants closer than this fraction of a period are one.
 // far above the rounding of a sum of instants, 1e-16, and far below any edge: 1e-16 s at 10 kHz
-const SAME: f64 = 1e-12;
+pub(crate) const SAME: f64 = 1e-12;
 
 impl Plant {
     /// One control period in which `before` gives way to `after` at the fraction `at`.

@@ -270,7 +270,7 @@ fn batch_gives_the_bits_of_the_plant() {
     let loads: Vec<_> = (0..19).map(|n| Load::power(30.0 * n as f64)).collect();
     for (n, plant) in plants.iter_mut().enumerate() {
         plant.reset_at(100.0, n as f64 - 2.0, &loads[n]);
-        batch.reset_at(n, 100.0, n as f64 - 2.0);
+        batch.reset_at(n, 100.0, n as f64 - 2.0, &loads[n]);
     }
     for step in 0..300 {
         let duties: Vec<_> = (0..19).map(|n| duty(step + n)).collect();
@@ -290,7 +290,8 @@ fn batch_gives_the_bits_of_the_plant() {
 #[test]
 fn a_batch_refuses_what_it_cannot_hold() {
     let mut p = Parameters::paper_model();
-    p.capacitor.esr = 0.1;
+    p.cable.inductance = 1e-6;
+    p.cable.capacitance = 1e-6;
     let faults = Batch::new(&[Parameters::paper_model(), p]).unwrap_err();
     assert!(faults.to_string().contains("converter 1"), "{faults}");
 }

@@ -169,7 +169,7 @@ fn a_batch_of_all_topologies_gives_the_bits_of_the_plants() {
     let loads: Vec<_> = (0..24).map(|n| LOADS[n % 3]).collect();
     for (n, plant) in plants.iter_mut().enumerate() {
         plant.reset_at(120.0, n as f64 - 4.0, &loads[n]);
-        batch.reset_at(n, 120.0, n as f64 - 4.0);
+        batch.reset_at(n, 120.0, n as f64 - 4.0, &loads[n]);
     }
     for step in 0..200 {
         let duties: Vec<_> = (0..24)

@@ -74,7 +74,9 @@ def test_observations_and_states_have_the_bits_of_simulate_over_a_hundred_thousa
     [
         ({}, True),
         ({"randomise": [{"key": "converter.inductance", "factor": [0.7, 1.3]}]}, True),
-        ({"set": {"capacitor.esr": 0.03}, "episode": {"any_phase": True, "load_every": 7}}, False),
+        ({"set": {"capacitor.esr": 0.03}, "episode": {"any_phase": True, "load_every": 7}}, True),
+        ({"set": {"sensors.v_out.noise": 0.02}}, True),
+        ({"set": {"capacitor.esr": 0.03, "pwm.carrier": 2}, "episode": {"any_phase": True, "load_every": 7}}, False),
         ({**CONTINUOUS}, True),
     ],
 )

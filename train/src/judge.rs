@@ -14,6 +14,7 @@ use crate::contract::Contract;
 use crate::faults::Error;
 use crate::learner::greedy;
 use crate::network::Network;
+use crate::quick::{Quick, Scratch};
 use crate::score::{Score, Scoring};
 use crate::settings::Requirement;
 use crate::trainer::Trainer;
@@ -122,14 +123,14 @@ pub fn quick_controller(
 ) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
     let mut agent = Agent::<f32>::new(&contract.policy)?;
     // shared: every run of a look goes on from a copy of its lead's controller
-    let network = Arc::new(network.clone());
-    let mut scratch = [Vec::new(), Vec::new()];
+    let network = Arc::new(Quick::new(network));
+    let mut scratch = Scratch::default();
     Ok(move |sample: &Sample| {
         if agent.sense(&sample.measured).is_err() {
             return f64::NAN;
         }
-        network.q_values(agent.observation(), &mut scratch);
-        agent.act(greedy(&scratch[0]) as u32)
+        let q_values = network.q_values(agent.observation(), &mut scratch);
+        agent.act(greedy(q_values) as u32)
     })
 }
 

@@ -23,6 +23,7 @@ pub mod optimiser;
 pub mod outcome;
 pub mod page;
 mod progress;
+mod quick;
 pub mod replay;
 mod rest_page;
 mod resume;

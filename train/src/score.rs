@@ -31,11 +31,22 @@ pub struct Score {
 pub struct Scoring<'a> {
     load_steps: &'a [[f64; 2]],
     specification: &'a [Requirement],
-    margin: f64,
-    /// Those of the specification that speak of each load step.
-    concerned: Vec<Vec<&'a Requirement>>,
+    /// What is limited of each load step.
+    // in a list of its own: a look asks for the score thousands of times, and a list of figures for each cost as much as the runs
+    limited: Vec<Vec<Limited>>,
     /// Number of figures that are limited.
     count: f64,
+}
+
+/// How to read a figure.
+type Read = fn(&Metrics) -> f64;
+
+/// A figure that is limited.
+#[derive(Debug, Clone, Copy)]
+struct Limited {
+    instants: Instants,
+    figure: Read,
+    limit: f64,
 }
 
 impl<'a> Scoring<'a> {
@@ -45,18 +56,14 @@ impl<'a> Scoring<'a> {
         let mut scoring = Self {
             load_steps,
             specification,
-            margin,
-            concerned: Vec::new(),
+            limited: Vec::new(),
             count: 0.0,
         };
-        let concerned = |index| {
-            let speaks = |requirement: &&Requirement| scoring.concerns(requirement, index);
-            specification.iter().filter(speaks).collect()
-        };
-        scoring.concerned = (0..load_steps.len()).map(concerned).collect();
-        let figures = |index| scoring.limited(index, &Metrics::default(), &Metrics::default()).len();
+        scoring.limited = (0..load_steps.len())
+            .map(|index| scoring.limits(index, margin))
+            .collect();
         // of all load steps: over those seen so far the mean of the first few would be no lower bound
-        scoring.count = (0..load_steps.len()).map(figures).sum::<usize>().max(1) as f64;
+        scoring.count = scoring.limited.iter().map(Vec::len).sum::<usize>().max(1) as f64;
         scoring
     }
 
@@ -64,9 +71,18 @@ impl<'a> Scoring<'a> {
     #[must_use]
     pub fn score(&self, findings: &[Finding]) -> Score {
         let (mut ratios, mut excess) = (0.0, 0.0);
-        for (index, finding) in findings.iter().enumerate() {
-            for (value, limit) in self.limited(index, &finding.at_sample, &finding.worst) {
-                let ratio = value / (limit * self.margin);
+        for (finding, limited) in findings.iter().zip(&self.limited) {
+            for Limited {
+                instants,
+                figure,
+                limit,
+            } in limited
+            {
+                let value = match instants {
+                    Instants::Sample => figure(&finding.at_sample),
+                    Instants::Worst => figure(&finding.worst),
+                };
+                let ratio = value / limit;
                 // in this form a NaN counts as worst
                 let ratio = if ratio < WORST_RATIO { ratio } else { WORST_RATIO };
                 ratios += ratio;
@@ -81,19 +97,31 @@ impl<'a> Scoring<'a> {
         }
     }
 
-    /// Figures of load step `index` and their limits. Without a specification the worst deviation counts against 10 V,
-    /// settling against 10 ms and the tail against 1 V.
-    fn limited(&self, index: usize, at_sample: &Metrics, worst: &Metrics) -> Vec<(f64, f64)> {
+    /// What is limited of load step `index`. Without a specification the worst deviation counts against 10 V, settling against 10 ms
+    /// and the tail against 1 V.
+    fn limits(&self, index: usize, margin: f64) -> Vec<Limited> {
         if self.specification.is_empty() {
             // conventions: twice the paper's 5 V and 5 ms, and what its bench had left without a mapping
-            return vec![(worst.deviation, 10.0), (worst.settling, 1e-2), (worst.tail_max, 1.0)];
+            let usual: [(Read, f64); 3] = [(|m| m.deviation, 10.0), (|m| m.settling, 1e-2), (|m| m.tail_max, 1.0)];
+            let limited = |(figure, limit): (Read, f64)| Limited {
+                instants: Instants::Worst,
+                figure,
+                limit: limit * margin,
+            };
+            return usual.map(limited).into();
         }
-        let concerned = self.concerned.get(index).into_iter().flatten();
-        let pairs = concerned.flat_map(|requirement| match requirement.instants {
-            Instants::Sample => figures(at_sample, requirement),
-            Instants::Worst => figures(worst, requirement),
+        let concerned = self
+            .specification
+            .iter()
+            .filter(|requirement| self.concerns(requirement, index));
+        let limited = concerned.flat_map(|requirement| {
+            limits(requirement).map(|(_, figure, limit)| Limited {
+                instants: requirement.instants,
+                figure,
+                limit: limit * margin,
+            })
         });
-        pairs.map(|(_, value, limit)| (value, limit)).collect()
+        limited.collect()
     }
 
     /// Whether a requirement speaks of load step `index`.
@@ -113,19 +141,24 @@ impl<'a> Scoring<'a> {
 /// The figures a requirement limits: the limit's key, figure and limit.
 #[must_use]
 pub fn figures(metrics: &Metrics, requirement: &Requirement) -> Vec<(&'static str, f64, f64)> {
-    let (limits, chatter) = (&requirement.limits, &metrics.chatter);
-    let pairs = [
-        ("deviation", metrics.deviation, limits.deviation),
-        ("settling", metrics.settling, limits.settling),
-        ("tail", metrics.tail_max, limits.tail),
-        ("duty_activity", chatter.duty_activity, limits.duty_activity),
-        ("current_swing", chatter.current_swing, limits.current_swing),
-        ("subharmonic", chatter.subharmonic, limits.subharmonic),
-    ];
-    pairs
-        .into_iter()
-        .filter_map(|(key, value, limit)| Some((key, value, limit?)))
+    limits(requirement)
+        .map(|(key, figure, limit)| (key, figure(metrics), limit))
         .collect()
+}
+
+/// What a requirement limits: the limit's key, how to read the figure, and the limit.
+fn limits(requirement: &Requirement) -> impl Iterator<Item = (&'static str, Read, f64)> {
+    let limits = &requirement.limits;
+    let all: [(&str, Read, Option<f64>); 6] = [
+        ("deviation", |m| m.deviation, limits.deviation),
+        ("settling", |m| m.settling, limits.settling),
+        ("tail", |m| m.tail_max, limits.tail),
+        ("duty_activity", |m| m.chatter.duty_activity, limits.duty_activity),
+        ("current_swing", |m| m.chatter.current_swing, limits.current_swing),
+        ("subharmonic", |m| m.chatter.subharmonic, limits.subharmonic),
+    ];
+    all.into_iter()
+        .filter_map(|(key, figure, limit)| Some((key, figure, limit?)))
 }
 
 #[cfg(test)]

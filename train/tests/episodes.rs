@@ -102,8 +102,16 @@ fn so_do_those_that_are_drawn_anew_for_each_episode() {
 }
 
 #[test]
+fn so_do_those_with_an_esr_and_with_noisy_sensors() {
+    let esr = "[[randomise]]\nkey = \"capacitor.esr\"\nvalue = [0.0, 0.05]\n";
+    hold_against_each_other(&settings(esr), &[], true);
+    let noise = "[[randomise]]\nkey = \"sensors.v_out.noise\"\nvalue = [0.01, 0.05]\n";
+    hold_against_each_other(&settings(noise), &[], true);
+}
+
+#[test]
 fn a_converter_that_is_not_plain_is_computed_alone() {
-    let drawn = "[[randomise]]\nkey = \"capacitor.esr\"\nvalue = [0.0, 0.05]\n";
+    let drawn = "[[randomise]]\nkey = \"inductor.saturation\"\nvalue = [0.0, 0.2]\n";
     hold_against_each_other(&settings(drawn), &[], false);
 }
 

@@ -114,6 +114,11 @@ impl Nominal {
         paced.then(|| self.capacitance / self.period / (self.give * self.asked))
     }
 
+    /// Control periods in which the source alone raises the current from nothing to what holds the largest load.
+    pub(super) fn effort(&self) -> f64 {
+        self.load / self.give * self.inductance / (self.v_in * self.period)
+    }
+
     /// The load below which a diode stops the current in every period, A.
     #[must_use]
     pub fn least_load(&self) -> f64 {

@@ -1,7 +1,7 @@
 //! The converters themselves: side by side where they are plain enough, one by one otherwise.
 
 use closed_loop::{Converter, Environment, LoadPath, Start};
-use plant::{Batch, Load, Parameters, Sample, Signals};
+use plant::{Batch, Load, Parameters, Sample};
 
 use crate::faults::Error;
 use crate::settings::{Draw, Settings};
@@ -19,6 +19,8 @@ pub(super) enum Plants {
 pub(super) struct SideBySide {
     batch: Batch,
     loads: Vec<Load>,
+    /// Converter, fraction of the period and load behind it.
+    changes: Vec<(usize, f64, Load)>,
     /// Whether a converter has other numbers than the plant's file.
     varied: Vec<bool>,
 }
@@ -33,6 +35,7 @@ impl Plants {
             return Ok(Self::Batch(Box::new(SideBySide {
                 batch: Batch::new(&vec![nominal.parameters().clone(); count])?,
                 loads: vec![Load::default(); count],
+                changes: Vec::new(),
                 varied: vec![false; count],
             })));
         }
@@ -43,14 +46,15 @@ impl Plants {
         match self {
             Self::Single(converters) => converters[index].restart(start),
             Self::Batch(many) => {
-                // most trainings vary nothing, and the converter that stands there is the right one
-                if many.varied[index] || !start.varied.is_empty() {
-                    let parameters = closed_loop::environment::varied(nominal.parameters(), start.varied);
+                let mut parameters = closed_loop::environment::varied(nominal.parameters(), start.varied);
+                parameters.sensors.seed ^= start.seed;
+                // most trainings vary nothing, and the converter that stands there is the right one; not if its noise begins anew
+                if many.varied[index] || !start.varied.is_empty() || is_noisy(&parameters) {
                     many.batch.replace(index, &parameters)?;
                     many.varied[index] = !start.varied.is_empty();
                 }
-                many.batch.reset_at(index, start.v_out, start.i_l);
-                Ok(shown(many.batch.signals(index, &start.load)))
+                many.batch.reset_at(index, start.v_out, start.i_l, &start.load);
+                Ok(shown(&many.batch, index, &start.load))
             }
         }
     }
@@ -70,27 +74,18 @@ impl Plants {
         for (load, path) in many.loads.iter_mut().zip(paths) {
             *load = path.before;
         }
-        // computed with the others and put back: changes are rare
-        let changing = |(index, path): (usize, &LoadPath)| path.change.map(|change| (index, change));
-        let changes: Vec<_> = paths
-            .iter()
-            .enumerate()
-            .filter_map(changing)
-            .map(|(index, change)| (index, change, batch.v_out()[index], batch.i_l()[index]))
-            .collect();
-        batch.step(duties, &many.loads);
-        for (index, (at, after), v_out, i_l) in changes {
-            batch.reset_at(index, v_out, i_l);
-            batch.step_with_change(
-                index,
-                duties[index],
-                [&paths[index].before, &after],
-                at.min(1.0 - JUST_BEFORE),
-            );
-            many.loads[index] = after;
+        many.changes.clear();
+        for (index, path) in paths.iter().enumerate() {
+            if let Some((at, after)) = path.change {
+                many.changes.push((index, at.min(1.0 - JUST_BEFORE), after));
+            }
+        }
+        batch.step_with_changes(duties, &many.loads, &many.changes);
+        for (index, _, after) in &many.changes {
+            many.loads[*index] = *after;
         }
         for (index, load) in many.loads.iter().enumerate() {
-            take(index, shown(batch.signals(index, load)));
+            take(index, shown(batch, index, load));
         }
     }
 }
@@ -113,14 +108,22 @@ fn fits(settings: &Settings, nominal: &Converter) -> bool {
     fits(nominal.parameters()) && fits(&parameters)
 }
 
-/// A sample of sensors that show what is.
-fn shown(signals: Signals) -> Sample {
+fn is_noisy(parameters: &Parameters) -> bool {
+    let all = &parameters.sensors;
+    [&all.v_out, &all.i_l, &all.i_out, &all.v_in]
+        .iter()
+        .any(|sensor| sensor.noise > 0.0)
+}
+
+/// A sample without extremes.
+fn shown(batch: &Batch, index: usize, load: &Load) -> Sample {
+    let signals = batch.signals(index, load);
     Sample {
         v_out: signals.v_out,
         i_l: signals.i_l,
         i_out: signals.i_out,
         v_in: signals.v_in,
-        measured: signals,
+        measured: batch.measured(index, load),
         ..Sample::default()
     }
 }

@@ -1,10 +1,11 @@
 //! Noise of each channel, outliers, and what is left in a residual that noise would not leave.
 
 mod few;
+mod rings;
 
 use crate::exact::Exact;
 use crate::flicker;
-use crate::median::median;
+use crate::median::middle;
 use crate::problem::{Problem, dot};
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 
@@ -48,10 +49,10 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             }
             let shown: Vec<f64> = rows.iter().map(|row| values[*row]).collect();
             let digit = one.lattice[n].max(one.resolution[n]) / problem.sigma[n];
-            scatter(&shown, |triple| triple.iter().all(|v| *v != 0.0)).max(flicker::noise(&shown, digit))
+            scatter_of_ringing(&shown, |rows| rows.iter().all(|v| *v != 0.0)).max(flicker::noise(&shown, digit))
         };
         // the median: one noisy record must not hide what the others show
-        let typical = median((0..problem.records.len()).map(of)) * few::unsure(problem, n);
+        let typical = middle((0..problem.records.len()).map(of)) * few::unsure(problem, n);
         let steps = problem.records.iter().map(|r| r.lattice[n].max(r.resolution[n]));
         let lattice = steps.fold(0.0, f64::max);
         let scale = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n];
@@ -59,7 +60,8 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
         let least = (lattice / 12f64.sqrt())
             .max(least_share(problem) * scale)
             .max(stuck(problem, n))
-            .max(few::steps(problem, n));
+            .max(few::steps(problem, n))
+            .max(few::rounded(problem, n));
         let has = problem
             .records
             .iter()
@@ -126,17 +128,26 @@ fn metered(problem: &Problem, n: usize) -> f64 {
 /// Standard deviation of noise by second differences of the triples that count; NaN where there are too few.
 pub(crate) fn scatter(values: &[f64], counts: impl Fn(&[f64]) -> bool) -> f64 {
     let triples = values.windows(3).filter(|triple| counts(triple));
-    let mut second: Vec<f64> = triples.map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
+    let second: Vec<f64> = triples.map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
     if second.len() < 5 {
         return f64::NAN;
     }
-    second.sort_by(f64::total_cmp);
-    // the smaller four fifths: a mean, since the median of values on the steps of a converter is a step itself, a quarter off
-    // where a step is half the noise
-    let kept = &second[..second.len() - second.len() / 5];
-    let mean = kept.iter().sum::<f64>() / kept.len() as f64;
-    // their mean over sigma for a normal distribution, and three independent terms with weights 1, -2, 1
-    mean / 0.558_61 / 6f64.sqrt()
+    // three independent terms with weights 1, -2, 1
+    kept(second) / 6f64.sqrt()
+}
+
+/// [`scatter`] where what swings is not to be seen as noise.
+pub(crate) fn scatter_of_ringing(values: &[f64], counts: impl Fn(&[f64]) -> bool) -> f64 {
+    rings::scatter(values, &counts, scatter(values, &counts))
+}
+
+/// Standard deviation of a normal number of which the sizes are `sizes`, by the smaller four fifths: a mean, since the median of values
+/// on the steps of a converter is a step itself, a quarter off where a step is half the noise.
+fn kept(mut sizes: Vec<f64>) -> f64 {
+    sizes.sort_by(f64::total_cmp);
+    let kept = &sizes[..sizes.len() - sizes.len() / 5];
+    // their mean over sigma for a normal distribution
+    kept.iter().sum::<f64>() / kept.len() as f64 / 0.558_61
 }
 
 /// A converter coarser than the noise shows one value nearly always: its rounding error is then the same in all rows, which

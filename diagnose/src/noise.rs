@@ -2,16 +2,16 @@
 
 mod few;
 mod rings;
+mod spikes;
 
 use crate::exact::Exact;
 use crate::flicker;
 use crate::median::middle;
 use crate::problem::{Problem, dot};
-use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
+use crate::record::{CHANNELS, Record};
 
-/// An outlier differs from its neighbours by more than this many standard deviations beyond their own spread. Normal noise does
-/// so in one row of 1e15, at half of it in one of 1e6; at double, a wrong bit of 16 steps of the noise would pass.
-const FAR: f64 = 8.0;
+pub use spikes::{Outlier, outliers, spikes};
+
 /// A channel is stuck on one value if this share of neighbours are equal. Noise of half a step still changes the value between half
 /// of all rows. A convention between that and 1.
 const STUCK: f64 = 0.8;
@@ -182,98 +182,6 @@ fn stuck(problem: &Problem, n: usize) -> f64 {
     }
 }
 
-/// An outlier.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Outlier {
-    /// Which record.
-    pub record: usize,
-    /// Which row.
-    pub row: usize,
-    /// Which channel.
-    pub channel: usize,
-}
-
-/// Rows that leap out of the measured signal and of the residual alike.
-#[must_use]
-pub fn outliers(problem: &Problem, residual: &[f64]) -> Vec<Outlier> {
-    let mut found = Vec::new();
-    for (index, record) in problem.records.iter().enumerate().filter(|(_, r)| !r.settled) {
-        for n in 0..CHANNELS {
-            let left = channel(problem, residual, index, n);
-            let raw: Vec<f64> = record.measured[n].iter().map(|v| v / problem.sigma[n]).collect();
-            for row in 2..record.rows().saturating_sub(2) {
-                // both: what leaps in the signal alone the model explains, what leaps in the residual alone it brings
-                if leaps(&left, row) && (leaps(&raw, row) || leaps_off_curve(&raw, row)) {
-                    found.push(Outlier {
-                        record: index,
-                        row,
-                        channel: n,
-                    });
-                }
-            }
-        }
-    }
-    found
-}
-
-/// Whether a row lies apart from its neighbours, beyond their own spread.
-fn leaps(values: &[f64], row: usize) -> bool {
-    let near = [values[row - 2], values[row - 1], values[row + 1], values[row + 2]];
-    let (low, high) = near
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    let apart = (values[row] - high).max(low - values[row]);
-    near.iter().all(|v| v.is_finite()) && apart > FAR + (high - low)
-}
-
-/// A row lies off the curve through its neighbours this many times as far as rows near it do: a signal that swings bends everywhere.
-const OFF_CURVE: f64 = 4.0;
-
-/// Distance to the cubic curve through two neighbours on each side; nothing at an end or beside a hole.
-fn off_curve(values: &[f64], row: usize) -> Option<f64> {
-    let at = |by: isize| row.checked_add_signed(by).and_then(|row| values.get(row).copied());
-    let curve = (4.0 * (at(-1)? + at(1)?) - at(-2)? - at(2)?) / 6.0;
-    Some((values[row] - curve).abs()).filter(|off| off.is_finite())
-}
-
-/// Whether a row leaps out of a signal that swings, which hides a leap in the spread of its neighbours.
-fn leaps_off_curve(values: &[f64], row: usize) -> bool {
-    // the curves three and four rows further on do not go through this one
-    let near = [-4_isize, -3, 3, 4].map(|by| row.checked_add_signed(by).and_then(|row| off_curve(values, row)));
-    let known: Vec<f64> = near.into_iter().flatten().collect();
-    let usual = known.iter().copied().fold(0.0, f64::max);
-    // at a step one of the neighbours lies where the row lies
-    let [before, after] = [row - 1, row + 1].map(|other| values[row] - values[other]);
-    // the curves of its neighbours go through a leap, and lie off by two thirds of it
-    let beside = [row - 1, row + 1].map(|other| off_curve(values, other).unwrap_or(0.0));
-    let is_single = |off: f64| {
-        before * after > 0.0 && before.abs().min(after.abs()) > 0.5 * off && beside.iter().all(|other| *other < off)
-    };
-    known.len() >= 3
-        && off_curve(values, row).is_some_and(|off| off > 2.0 * FAR && off > OFF_CURVE * usual && is_single(off))
-}
-
-/// Outliers that one sentence lists; a reader looks at no more.
-const LISTED: usize = 3;
-
-/// What is said of outliers.
-#[must_use]
-pub fn spikes(problem: &Problem, outliers: &[Outlier]) -> Option<String> {
-    let place = |one: &Outlier| {
-        let record = &problem.records[one.record];
-        format!(
-            "{} of {} at t = {:.6} s",
-            CHANNEL_NAMES[one.channel], record.name, record.time[one.row]
-        )
-    };
-    let listed: Vec<String> = outliers.iter().take(LISTED).map(place).collect();
-    let more = match outliers.len().saturating_sub(LISTED) {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    (!outliers.is_empty()).then(|| format!("spikes of single rows are left out: {}{more}", listed.join(", ")))
-}
-
 /// How much more a sum over the records scatters than independent white noise would: noise that is the same in several
 /// records, and noise that is correlated in time.
 #[must_use]
@@ -357,7 +265,7 @@ pub fn left(values: &[f64]) -> Left {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use super::{leaps_off_curve, scatter};
+    use super::scatter;
 
     /// Twelve uniform numbers of a linear congruential generator make a normal one.
     pub(crate) fn normal(state: &mut u64) -> f64 {
@@ -388,26 +296,6 @@ pub(crate) mod tests {
                 "step {step}: {mean} with {spread}"
             );
         }
-    }
-
-    #[test]
-    fn a_spike_on_a_swing_is_seen_and_a_step_or_a_swing_is_none() {
-        let mut state = 7;
-        let swing: Vec<f64> = (0..200)
-            .map(|n| 100.0 * (f64::from(n) * 0.3).sin() + normal(&mut state))
-            .collect();
-        let mut spiked = swing.clone();
-        spiked[93] += 60.0;
-        let step: Vec<f64> = (0..200)
-            .map(|n| if n < 77 { 0.0 } else { 80.0 } + normal(&mut state))
-            .collect();
-        let seen = |values: &[f64]| {
-            (2..198)
-                .filter(|row| leaps_off_curve(values, *row))
-                .collect::<Vec<usize>>()
-        };
-        assert_eq!(seen(&spiked), [93]);
-        assert!(seen(&swing).is_empty() && seen(&step).is_empty());
     }
 
     #[test]

@@ -223,10 +223,10 @@ pub fn nearest(partial: &[Named], removed: f64, fits_training: bool, left: &[Str
         false => {
             let worst = left.iter().max_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
             let rest = worst.map_or(String::new(), |one| {
-                format!(" It leaves {}.", shapes(std::slice::from_ref(one)))
+                format!(", which leaves {}", shapes(std::slice::from_ref(one)))
             });
             format!(
-                " Nearest comes {}. That takes away {:.0} % of the error above the noise: too little for an explanation.{rest}",
+                " Nearest comes {}{rest}. That takes away {:.0} % of the error above the noise: too little for an explanation.",
                 list.join("; with "),
                 100.0 * removed
             )

@@ -21,7 +21,7 @@ use crate::noise;
 use crate::problem::{Problem, dot};
 use crate::progress::{Listener, Progress};
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
-use crate::shape::structures;
+use crate::shape::{self, Structure, structures};
 use crate::worth;
 
 /// Looks without a part: each is a whole search. The causes bend to what no cause explains, so that the part that is left worst is not
@@ -206,10 +206,21 @@ fn may_miss(problem: &Problem, channel: usize) -> bool {
     is_measured(channel) && !is_load && left >= FEWEST_CHANNELS && moves
 }
 
-/// Whether what was set aside bears the causes.
+/// Whether what was set aside bears the causes, and shows nothing that the converter does and its instruments do not.
 fn is_borne(found: &Examined, part: Part, whole: &Problem, records: &[Record], base: &Model) -> bool {
     let [before, after] = squares(found, part, whole, records, base);
-    after <= WORSE * before
+    after <= WORSE * before && !is_kicked(found, part, whole)
+}
+
+/// Whether the channel that was set aside swings as the filter does: no instrument does, and the other channels are of the same converter.
+fn is_kicked(found: &Examined, part: Part, whole: &Problem) -> bool {
+    let Part::Channel(n) = part else { return false };
+    let (problem, null, state) = with_channel(found, whole, n);
+    let left = structures(&problem, &null, &state, found.attribution.inflation);
+    (0..problem.records.len()).any(|index| {
+        let is_left = |one: &Structure| (one.channel, &one.record) == (CHANNEL_NAMES[n], &problem.records[index].name);
+        left.iter().any(is_left) && shape::is_kicked(&problem, &state, (index, n))
+    })
 }
 
 /// Sums of squares of what was set aside, without and with the causes.

@@ -13,6 +13,7 @@ use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::search::{Known, Searcher, TIE, gained};
 use crate::shape::structures;
+use crate::small;
 
 /// Causes that are fitted with free instants from where they fit without. As many as are fitted after a linear look in the search: a
 /// convention.
@@ -43,7 +44,7 @@ pub struct Attribution {
 /// their instants free.
 #[must_use]
 pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, Attribution) {
-    if crate::balance::broken(&problem).is_some() {
+    if crate::balance::broken(&problem).is_some() || small::is_disordered(&problem, &null) {
         // no cause mends them: a search would take its longest and find nothing
         return without_search(problem, null);
     }

@@ -120,8 +120,9 @@ pub fn diagnose_knowing(
     let compared = compared::of(&found.problem, &kept, heldout);
     let more = standing.clone().into_iter().chain(work.said());
     let notes = answer.notes.into_iter().chain(unused).chain(more);
+    let left = found.left();
     let findings = Findings {
-        sentence: sentence(&found, &answer.causes, set_aside.as_ref())
+        sentence: sentence(&found, &answer.causes, set_aside.as_ref(), &left)
             + &answer.near
             + &compared.sentence()
             + &shifted(&answer.shifts),
@@ -135,7 +136,7 @@ pub fn diagnose_knowing(
         partial_gain: answer.partial_gain,
         set_aside,
         empirical: empirical.as_ref().map(|term| term.findings.clone()),
-        structure: found.structure.iter().chain(&found.lines).cloned().collect(),
+        structure: left,
         residuals: whiteness::of_both((&found.problem, found.attribution.state()), pair.as_ref()),
         doubts: doubts::said(&found.doubts),
         not_detectable: answer.not_detectable,
@@ -271,8 +272,12 @@ fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<Str
     let mut near = String::new();
     if !explained && !found.is_misread() {
         odd.extend(other_carrier(problem, attribution));
-        near = nearest(&found.named, attribution.removed(problem), found.fits_training_alone())
-            + &other_carrier_said(found);
+        near = nearest(
+            &found.named,
+            attribution.removed(problem),
+            found.fits_training_alone(),
+            &found.structure,
+        ) + &other_carrier_said(found);
     }
     odd.extend(notes(found, pair));
     let mut causes = if explained { found.named.clone() } else { Vec::new() };

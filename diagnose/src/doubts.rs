@@ -10,6 +10,8 @@ use crate::shape::Structure;
 use crate::small;
 use crate::words::{si, unit};
 
+/// The channel of the source voltage, which stands still.
+const V_IN: usize = 3;
 /// A value so near to its bound, as a share of its range, is at it: a fit stops there because it may not go on.
 const AT_BOUND: f64 = 0.01;
 /// A lower bound of a size below this share of the upper one is where an effect ends to be one, not where it is cut off.
@@ -57,6 +59,8 @@ pub enum Doubt {
     Open(String),
     /// More freedom than the data have.
     Freedom(String),
+    /// Several causes, most of which could be others.
+    Loose(String),
     /// No converter of this kind gives the records.
     Kind(String),
     /// The records look like those of the model in another reading: a fault of the bench.
@@ -75,6 +79,7 @@ pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], st
             false => list,
         };
     };
+    list.extend(loose(problem, attribution));
     let mut place = 0;
     let mut member = usize::MAX;
     for profile in profiles {
@@ -117,6 +122,35 @@ fn edges(attribution: &Attribution) -> Option<Doubt> {
     )))
 }
 
+/// Causes of one explanation from which on some have to be held by the records alone.
+const MANY: usize = 3;
+
+/// Several causes of which each could be another fit whatever bends a record: one channel is given by many pairs, and anything by threes.
+fn loose(problem: &Problem, attribution: &Attribution) -> Option<Doubt> {
+    let tied = attribution.rivals.iter().filter(|rivals| !rivals.is_empty()).count();
+    let causes = attribution.best.as_ref().map_or(0, |best| best.causes.len());
+    let in_time = problem
+        .records
+        .iter()
+        .all(|record| !record.settled && record.capture.is_none());
+    let shown = (0..V_IN).filter(|n| problem.sigma[*n].is_finite()).count();
+    is_loose((causes, tied), in_time && shown == 1).map(Doubt::Loose)
+}
+
+/// What is said of so many causes of which so many could be others, if they are held by too little; `alone` if one channel tells of them.
+fn is_loose((causes, tied): (usize, usize), alone: bool) -> Option<String> {
+    match (causes, tied) {
+        (MANY.., 2..) => Some(format!(
+            "of {causes} causes {tied} could be others: so many numbers fit what no cause of the list makes"
+        )),
+        (2, 2) if alone => Some(
+            "both causes could be others, and one channel alone is given by many pairs: measure another as well"
+                .to_owned(),
+        ),
+        _ => None,
+    }
+}
+
 fn freedom(problem: &Problem, structure: &[Structure]) -> Vec<Doubt> {
     let said = small::freedom(problem).filter(|_| !structure.is_empty());
     said.map(Doubt::Freedom).into_iter().collect()
@@ -129,7 +163,7 @@ pub fn forbids(named: &[Named], doubts: &[Doubt]) -> bool {
         Doubt::Bound(_) => !named.is_empty(),
         Doubt::Open(_) => !named.is_empty() && !tied,
         Doubt::Freedom(_) | Doubt::HeldOut(..) => false,
-        Doubt::Kind(_) | Doubt::Edges(_) | Doubt::Bench(_) => true,
+        Doubt::Loose(_) | Doubt::Kind(_) | Doubt::Edges(_) | Doubt::Bench(_) => true,
     })
 }
 
@@ -139,6 +173,7 @@ pub fn said(doubts: &[Doubt]) -> Vec<String> {
         Doubt::Bound(words)
         | Doubt::Open(words)
         | Doubt::Freedom(words)
+        | Doubt::Loose(words)
         | Doubt::HeldOut(_, words)
         | Doubt::Kind(words)
         | Doubt::Bench(words)
@@ -149,7 +184,17 @@ pub fn said(doubts: &[Doubt]) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::is_cut_off;
+    use super::{is_cut_off, is_loose};
+
+    #[test]
+    fn causes_of_which_most_could_be_others_are_loose() {
+        assert!(is_loose((3, 2), false).is_some() && is_loose((3, 3), true).is_some());
+        assert!(is_loose((2, 2), true).is_some());
+        // the ties of power electronics are no fault of an explanation
+        for (causes, tied, alone) in [(1, 1, true), (2, 2, false), (2, 1, true), (3, 1, false), (3, 0, true)] {
+            assert_eq!(is_loose((causes, tied), alone), None, "{causes} {tied} {alone}");
+        }
+    }
 
     #[test]
     fn a_size_may_end_at_nothing_and_a_shape_may_end_nowhere() {

@@ -95,6 +95,10 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
     }
     read_off.extend(quantised::cause(&problem));
     let holds = structure.is_empty() && !doubts::forbids(&named, &doubts);
+    if holds && !named.is_empty() {
+        let refuted = |words: &String| (misread.iter()).any(|one| one.words == *words && one.is_refuted_by_a_cause());
+        odd.retain(|words| !refuted(words));
+    }
     Examined {
         verdict: verdict(&named, &read_off, holds),
         problem,
@@ -150,6 +154,21 @@ impl Examined {
             Verdict::Explained | Verdict::Ambiguous | Verdict::MostlyExplained => Verdict::MostlyExplained,
             Verdict::Consistent | Verdict::Unexplained => Verdict::Unexplained,
         }
+    }
+
+    /// What is left, to be told: of causes that explain nothing only what they leave beside them is known, and they bend it. So it is what
+    /// the model as given leaves where no cause is named.
+    #[must_use]
+    pub fn left(&self) -> Vec<Structure> {
+        let own = || self.structure.iter().chain(&self.lines).cloned().collect();
+        if self.verdict != Verdict::Unexplained || self.attribution.best.is_none() || self.structure.is_empty() {
+            return own();
+        }
+        let (problem, null) = (&self.problem, &self.attribution.null);
+        let given = structures(problem, null, null, noise::inflation(problem, &null.residual));
+        let lines = beside(fast::structures(problem, null, null), &given);
+        let all: Vec<Structure> = given.into_iter().chain(lines).collect();
+        if all.is_empty() { own() } else { all }
     }
 
     /// Takes over what was read off more of the same records before.

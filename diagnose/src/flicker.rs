@@ -6,6 +6,8 @@
 //! ```
 //! The middle of the differences from row to row is 0 there, and so is any estimate of noise that rests on middles.
 
+use std::f64::consts::PI;
+
 use measured::is_metered;
 use plant::Load;
 
@@ -35,6 +37,39 @@ pub(crate) fn noise(values: &[f64], digit: f64) -> f64 {
     // three independent terms with weights 1, -2, 1. A mean square, since no middle tells how often the digit beside is shown
     let square = small.iter().map(|d| d * d).sum::<f64>() / small.len() as f64;
     digit * (square / 6.0).sqrt()
+}
+
+/// Most values of a meter that goes between digits beside each other: with more a signal moves across them, and their rounding evens out.
+const FEW: usize = 4;
+/// Share of rows that are another value between two of one: a flicker has many, a load of levels none.
+const SINGLE: f64 = 0.05;
+
+/// The digit of a meter that flickers between a few; 0 for any other.
+pub(crate) fn digit(measured: &[f64]) -> f64 {
+    let shown: Vec<f64> = measured.iter().copied().filter(|v| v.is_finite()).collect();
+    let mut values = shown.clone();
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    let gaps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    let single = shown.windows(3).filter(|w| w[0] == w[2] && w[1] != w[0]).count();
+    // one apart but for their decimal form
+    let beside = gaps.iter().all(|gap| (gap / least - 1.0).abs() < 0.05);
+    let is_flicker = (2..=FEW).contains(&values.len()) && beside && single as f64 > SINGLE * shown.len() as f64;
+    if is_flicker { least } else { 0.0 }
+}
+
+/// How far the mean of a meter that flickers may lie beside the truth: noise below a digit does not even its rounding out. 0 for any other.
+// the first harmonic of the sawtooth of rounding, behind normal noise: digit / pi exp(-2 pi^2 (sigma / digit)^2)
+pub(crate) fn bias(measured: &[f64]) -> f64 {
+    let digit = digit(measured);
+    let noise = noise(measured, digit);
+    if digit <= 0.0 || noise.is_nan() {
+        return 0.0;
+    }
+    // less what rounding adds to it
+    let square = ((noise / digit).powi(2) - 1.0 / 12.0).max(0.0);
+    digit / PI * libm::exp(-2.0 * PI * PI * square)
 }
 
 /// Steps of a load; what its meter's last digit does is none, where the load is driven by the meter.
@@ -103,6 +138,31 @@ mod tests {
         }
         // noise of two digits is no flicker
         assert!(noise(&metered(0.02, 0.01, 3), 0.01).is_nan());
+    }
+
+    #[test]
+    fn the_mean_of_a_flicker_lies_beside_the_truth_by_no_more_than_its_bias() {
+        for (sigma, digit) in [(0.26, 1.0), (0.2, 1.0), (0.35, 1.0)] {
+            for off in [0.05, 0.15, 0.25, 0.35, 0.45] {
+                let mut state = 11;
+                let values: Vec<f64> = (0..20_000)
+                    .map(|_| (off + sigma * normal(&mut state)).round())
+                    .collect();
+                assert_eq!(super::digit(&values), digit);
+                let beside = (values.iter().sum::<f64>() / 20_000.0 - off).abs();
+                let bias = super::bias(&values);
+                assert!(
+                    beside < 1.3 * bias + 0.01 && bias < 0.32,
+                    "{sigma} {off}: {beside}, bias {bias}"
+                );
+            }
+        }
+        let levels: Vec<f64> = (0..300).map(|n| f64::from(n / 100)).collect();
+        assert_eq!(
+            (super::digit(&levels), super::bias(&levels)),
+            (0.0, 0.0),
+            "levels are no flicker"
+        );
     }
 
     #[test]

@@ -1,16 +1,17 @@
 //! Noise of each channel, outliers, and what is left in a residual that noise would not leave.
 
 mod few;
+mod rings;
+mod spikes;
 
 use crate::exact::Exact;
 use crate::flicker;
-use crate::median::median;
+use crate::median::middle;
 use crate::problem::{Problem, dot};
-use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
+use crate::record::{CHANNELS, Record};
 
-/// An outlier differs from its neighbours by more than this many standard deviations beyond their own spread. Normal noise does
-/// so in one row of 1e15, at half of it in one of 1e6; at double, a wrong bit of 16 steps of the noise would pass.
-const FAR: f64 = 8.0;
+pub use spikes::{Outlier, outliers, spikes};
+
 /// A channel is stuck on one value if this share of neighbours are equal. Noise of half a step still changes the value between half
 /// of all rows. A convention between that and 1.
 const STUCK: f64 = 0.8;
@@ -48,10 +49,10 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             }
             let shown: Vec<f64> = rows.iter().map(|row| values[*row]).collect();
             let digit = one.lattice[n].max(one.resolution[n]) / problem.sigma[n];
-            scatter(&shown, |triple| triple.iter().all(|v| *v != 0.0)).max(flicker::noise(&shown, digit))
+            scatter_of_ringing(&shown, |rows| rows.iter().all(|v| *v != 0.0)).max(flicker::noise(&shown, digit))
         };
         // the median: one noisy record must not hide what the others show
-        let typical = median((0..problem.records.len()).map(of)) * few::unsure(problem, n);
+        let typical = middle((0..problem.records.len()).map(of)) * few::unsure(problem, n);
         let steps = problem.records.iter().map(|r| r.lattice[n].max(r.resolution[n]));
         let lattice = steps.fold(0.0, f64::max);
         let scale = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n];
@@ -59,7 +60,8 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
         let least = (lattice / 12f64.sqrt())
             .max(least_share(problem) * scale)
             .max(stuck(problem, n))
-            .max(few::steps(problem, n));
+            .max(few::steps(problem, n))
+            .max(few::rounded(problem, n));
         let has = problem
             .records
             .iter()
@@ -126,17 +128,26 @@ fn metered(problem: &Problem, n: usize) -> f64 {
 /// Standard deviation of noise by second differences of the triples that count; NaN where there are too few.
 pub(crate) fn scatter(values: &[f64], counts: impl Fn(&[f64]) -> bool) -> f64 {
     let triples = values.windows(3).filter(|triple| counts(triple));
-    let mut second: Vec<f64> = triples.map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
+    let second: Vec<f64> = triples.map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
     if second.len() < 5 {
         return f64::NAN;
     }
-    second.sort_by(f64::total_cmp);
-    // the smaller four fifths: a mean, since the median of values on the steps of a converter is a step itself, a quarter off
-    // where a step is half the noise
-    let kept = &second[..second.len() - second.len() / 5];
-    let mean = kept.iter().sum::<f64>() / kept.len() as f64;
-    // their mean over sigma for a normal distribution, and three independent terms with weights 1, -2, 1
-    mean / 0.558_61 / 6f64.sqrt()
+    // three independent terms with weights 1, -2, 1
+    kept(second) / 6f64.sqrt()
+}
+
+/// [`scatter`] where what swings is not to be seen as noise.
+pub(crate) fn scatter_of_ringing(values: &[f64], counts: impl Fn(&[f64]) -> bool) -> f64 {
+    rings::scatter(values, &counts, scatter(values, &counts))
+}
+
+/// Standard deviation of a normal number of which the sizes are `sizes`, by the smaller four fifths: a mean, since the median of values
+/// on the steps of a converter is a step itself, a quarter off where a step is half the noise.
+fn kept(mut sizes: Vec<f64>) -> f64 {
+    sizes.sort_by(f64::total_cmp);
+    let kept = &sizes[..sizes.len() - sizes.len() / 5];
+    // their mean over sigma for a normal distribution
+    kept.iter().sum::<f64>() / kept.len() as f64 / 0.558_61
 }
 
 /// A converter coarser than the noise shows one value nearly always: its rounding error is then the same in all rows, which
@@ -169,98 +180,6 @@ fn stuck(problem: &Problem, n: usize) -> f64 {
     } else {
         0.0
     }
-}
-
-/// An outlier.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Outlier {
-    /// Which record.
-    pub record: usize,
-    /// Which row.
-    pub row: usize,
-    /// Which channel.
-    pub channel: usize,
-}
-
-/// Rows that leap out of the measured signal and of the residual alike.
-#[must_use]
-pub fn outliers(problem: &Problem, residual: &[f64]) -> Vec<Outlier> {
-    let mut found = Vec::new();
-    for (index, record) in problem.records.iter().enumerate().filter(|(_, r)| !r.settled) {
-        for n in 0..CHANNELS {
-            let left = channel(problem, residual, index, n);
-            let raw: Vec<f64> = record.measured[n].iter().map(|v| v / problem.sigma[n]).collect();
-            for row in 2..record.rows().saturating_sub(2) {
-                // both: what leaps in the signal alone the model explains, what leaps in the residual alone it brings
-                if leaps(&left, row) && (leaps(&raw, row) || leaps_off_curve(&raw, row)) {
-                    found.push(Outlier {
-                        record: index,
-                        row,
-                        channel: n,
-                    });
-                }
-            }
-        }
-    }
-    found
-}
-
-/// Whether a row lies apart from its neighbours, beyond their own spread.
-fn leaps(values: &[f64], row: usize) -> bool {
-    let near = [values[row - 2], values[row - 1], values[row + 1], values[row + 2]];
-    let (low, high) = near
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    let apart = (values[row] - high).max(low - values[row]);
-    near.iter().all(|v| v.is_finite()) && apart > FAR + (high - low)
-}
-
-/// A row lies off the curve through its neighbours this many times as far as rows near it do: a signal that swings bends everywhere.
-const OFF_CURVE: f64 = 4.0;
-
-/// Distance to the cubic curve through two neighbours on each side; nothing at an end or beside a hole.
-fn off_curve(values: &[f64], row: usize) -> Option<f64> {
-    let at = |by: isize| row.checked_add_signed(by).and_then(|row| values.get(row).copied());
-    let curve = (4.0 * (at(-1)? + at(1)?) - at(-2)? - at(2)?) / 6.0;
-    Some((values[row] - curve).abs()).filter(|off| off.is_finite())
-}
-
-/// Whether a row leaps out of a signal that swings, which hides a leap in the spread of its neighbours.
-fn leaps_off_curve(values: &[f64], row: usize) -> bool {
-    // the curves three and four rows further on do not go through this one
-    let near = [-4_isize, -3, 3, 4].map(|by| row.checked_add_signed(by).and_then(|row| off_curve(values, row)));
-    let known: Vec<f64> = near.into_iter().flatten().collect();
-    let usual = known.iter().copied().fold(0.0, f64::max);
-    // at a step one of the neighbours lies where the row lies
-    let [before, after] = [row - 1, row + 1].map(|other| values[row] - values[other]);
-    // the curves of its neighbours go through a leap, and lie off by two thirds of it
-    let beside = [row - 1, row + 1].map(|other| off_curve(values, other).unwrap_or(0.0));
-    let is_single = |off: f64| {
-        before * after > 0.0 && before.abs().min(after.abs()) > 0.5 * off && beside.iter().all(|other| *other < off)
-    };
-    known.len() >= 3
-        && off_curve(values, row).is_some_and(|off| off > 2.0 * FAR && off > OFF_CURVE * usual && is_single(off))
-}
-
-/// Outliers that one sentence lists; a reader looks at no more.
-const LISTED: usize = 3;
-
-/// What is said of outliers.
-#[must_use]
-pub fn spikes(problem: &Problem, outliers: &[Outlier]) -> Option<String> {
-    let place = |one: &Outlier| {
-        let record = &problem.records[one.record];
-        format!(
-            "{} of {} at t = {:.6} s",
-            CHANNEL_NAMES[one.channel], record.name, record.time[one.row]
-        )
-    };
-    let listed: Vec<String> = outliers.iter().take(LISTED).map(place).collect();
-    let more = match outliers.len().saturating_sub(LISTED) {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    (!outliers.is_empty()).then(|| format!("spikes of single rows are left out: {}{more}", listed.join(", ")))
 }
 
 /// How much more a sum over the records scatters than independent white noise would: noise that is the same in several
@@ -346,7 +265,7 @@ pub fn left(values: &[f64]) -> Left {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use super::{leaps_off_curve, scatter};
+    use super::scatter;
 
     /// Twelve uniform numbers of a linear congruential generator make a normal one.
     pub(crate) fn normal(state: &mut u64) -> f64 {
@@ -377,26 +296,6 @@ pub(crate) mod tests {
                 "step {step}: {mean} with {spread}"
             );
         }
-    }
-
-    #[test]
-    fn a_spike_on_a_swing_is_seen_and_a_step_or_a_swing_is_none() {
-        let mut state = 7;
-        let swing: Vec<f64> = (0..200)
-            .map(|n| 100.0 * (f64::from(n) * 0.3).sin() + normal(&mut state))
-            .collect();
-        let mut spiked = swing.clone();
-        spiked[93] += 60.0;
-        let step: Vec<f64> = (0..200)
-            .map(|n| if n < 77 { 0.0 } else { 80.0 } + normal(&mut state))
-            .collect();
-        let seen = |values: &[f64]| {
-            (2..198)
-                .filter(|row| leaps_off_curve(values, *row))
-                .collect::<Vec<usize>>()
-        };
-        assert_eq!(seen(&spiked), [93]);
-        assert!(seen(&swing).is_empty() && seen(&step).is_empty());
     }
 
     #[test]

@@ -59,6 +59,16 @@ pub struct Misread {
     reading: Reading,
     /// Nothing but noise is left in this reading, and no cause of the list does the same.
     is_sure: bool,
+    /// No cause of the list does the same.
+    is_no_cause: bool,
+}
+
+impl Misread {
+    /// Whether a cause that explains the records speaks against it: the record cannot be both.
+    #[must_use]
+    pub fn is_refuted_by_a_cause(&self) -> bool {
+        self.is_no_cause && !self.is_sure
+    }
 }
 
 impl Reading {
@@ -230,6 +240,7 @@ fn best_reading(problem: &Problem, null: &State, index: usize) -> Option<Misread
         words: reading.words(whole, &null.model),
         reading,
         is_sure: left < WRONG && is_no_cause,
+        is_no_cause,
     })
 }
 

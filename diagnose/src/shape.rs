@@ -3,13 +3,14 @@
 use crate::capture::left;
 use crate::fast;
 use crate::fit::State;
+use crate::flicker;
 use crate::ideal::{self, Ideal};
 use crate::level::ACCURACY;
 use crate::noise::{self, BLOCK, channel};
 use crate::problem::Problem;
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, Record};
 use crate::small;
-use crate::spectrum::strongest_line;
+use crate::spectrum::{Line, strongest_line};
 use crate::words::si;
 
 /// Structure is seen where block means scatter this much more than white noise of the same size would let them: twice as much,
@@ -65,7 +66,7 @@ pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64
             // chi-square of n blocks has the variance 2 n; the bound, so that correlated noise hides no structure
             let scatter = (2.0 / left.blocks as f64).sqrt() * inflation.sqrt().min(1.5);
             // a coarse converter leaves patterns that are none of the plant's
-            let step = record.lattice[n];
+            let step = record.lattice[n].max(flicker::digit(&record.measured[n]));
             let coarse = step > 1.5 * problem.sigma[n] && left.square.sqrt() * problem.sigma[n] < step;
             // a simulator that is off by ACCURACY leaves that share of what was there, in squares
             let slow = left.slow > 1.0 + SLOW.max(SIGMAS * scatter) + ACCURACY * ACCURACY * before.slow;
@@ -104,8 +105,16 @@ fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &
         );
     }
     let place = place(problem, record, values, excess);
-    if let Some(line) = strongest_line(problem, &state.residual, n).filter(|line| line.share > LINE) {
-        let of_line = 0.5 * count * (line.amplitude / problem.sigma[n]).powi(2) / excess;
+    let of_line = |line: &Line| 0.5 * count * (line.amplitude / problem.sigma[n]).powi(2) / excess;
+    let (course, words) = followed(problem, (index, n), values);
+    let line = strongest_line(problem, &state.residual, n).filter(|line| {
+        let turns = line.frequency * record.rows() as f64 * problem.bases.t_sw;
+        // of a turn that nobody sees the end of it is not known that it comes again
+        let more = if turns < TURNS { MORE } else { 0.0 };
+        line.share > LINE && turns > 1.0 && (!is_slow || of_line(line) > course + more)
+    });
+    if let Some(line) = line {
+        let of_line = of_line(&line);
         let place = place.filter(|_| of_line < OF_EXCESS);
         return format!(
             "a line at {:.0} Hz of {:.3} ({:.0} % of the power){}",
@@ -117,7 +126,7 @@ fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &
     }
     match place {
         Some(place) => place,
-        None if is_slow => followed(problem, (index, n), values),
+        None if is_slow => words,
         None => "fast, without a line that stands out: a trembling from row to row".to_owned(),
     }
 }
@@ -126,6 +135,12 @@ fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &
 fn place(problem: &Problem, record: &Record, values: &[f64], excess: f64) -> Option<String> {
     let trembles = || {
         let share = trembling(problem, values, excess)?;
+        if dies_away(record, values) {
+            let share = 100.0 * share;
+            return Some(format!(
+                "a swing at about the frequency of the filter ({share:.0} % of what is not noise), largest behind steps of duty and load"
+            ));
+        }
         Some(format!(
             "a trembling at about the frequency at which the filter swings ({:.0} % of what is not noise), without steps before it: edges that \
              jitter or pulses that are lost kick it at random",
@@ -137,6 +152,27 @@ fn place(problem: &Problem, record: &Record, values: &[f64], excess: f64) -> Opt
         .or_else(trembles)
 }
 
+/// Whether most of what is left in a channel swings as the filter does, all the time and at no one frequency: something kicks the converter
+/// itself, and its instrument is as good as others.
+#[must_use]
+pub(crate) fn is_kicked(problem: &Problem, state: &State, (index, n): (usize, usize)) -> bool {
+    let (record, values) = (&problem.records[index], channel(problem, &state.residual, index, n));
+    let total: f64 = values.iter().map(|v| v * v).sum();
+    let count = values.iter().filter(|v| **v != 0.0).count() as f64;
+    let excess = total - count;
+    let of_line = |share: f64| share * total / excess;
+    excess > 0.0
+        && burst(&values, total).is_none()
+        && behind_steps(problem, record, &values, excess).is_none()
+        && kicks(record, &values, excess).is_none()
+        && !dies_away(record, &values)
+        && trembling(problem, &values, excess).is_some()
+        && strongest_line(problem, &state.residual, n).is_none_or(|line| of_line(line.share) < OF_EXCESS)
+}
+
+/// Turns of a line that a record has to hold: of fewer any bend of a course is one, and a line has to explain so much more than the course.
+const TURNS: f64 = 2.0;
+const MORE: f64 = 0.1;
 /// A line is all that is to be said if it holds this share of what noise does not: of two things the larger.
 const OF_EXCESS: f64 = 0.5;
 /// What is left lies behind the steps if the rows there hold this share of it, ...
@@ -150,6 +186,24 @@ const SWINGS: f64 = 1.5;
 fn is_stepped(record: &Record, row: usize) -> bool {
     let from = row.saturating_sub(2 * BLOCK).max(1);
     (from..(row + BLOCK).min(record.rows())).any(|row| !record.is_same_point(row, row - 1))
+}
+
+/// Times as much right behind the steps as later, from which on steps begin what swings: noise of 100 rows reaches 1.3.
+const DIES: f64 = 1.6;
+
+/// Whether what swings is larger in the rows right behind steps of duty and load than in as many that are farther from them.
+fn dies_away(record: &Record, values: &[f64]) -> bool {
+    let mut since = None;
+    let mut rows: Vec<(usize, f64)> = Vec::new();
+    for (row, value) in values.iter().enumerate() {
+        let is_step = row > 0 && !record.is_same_point(row, row - 1);
+        since = if is_step { Some(0) } else { since.map(|n: usize| n + 1) };
+        rows.extend(since.filter(|_| *value != 0.0).map(|n| (n, value * value - 1.0)));
+    }
+    rows.sort_by_key(|(since, _)| *since);
+    let (near, far) = rows.split_at(rows.len() / 2);
+    let sum = |part: &[(usize, f64)]| part.iter().map(|(_, excess)| excess).sum::<f64>();
+    sum(near) > DIES * sum(far).max(f64::MIN_POSITIVE)
 }
 
 /// What is left behind steps of duty and load alone, and behind which of them.
@@ -245,8 +299,9 @@ const ALIKE: f64 = 0.6;
 /// Shares of the square in which two courses are alike: the one that stands first in the list is taken. A convention.
 const AS_WELL: f64 = 0.05;
 
-/// What a slow residual goes along with, the one that explains most of its means; one step or none of these.
-fn followed(problem: &Problem, (index, n): (usize, usize), values: &[f64]) -> String {
+/// What a slow residual goes along with, the one that explains most of its means; one step or none of these. And the share of the square of
+/// the means that this explains.
+fn followed(problem: &Problem, (index, n): (usize, usize), values: &[f64]) -> (f64, String) {
     let record = &problem.records[index];
     let load = record.load.iter().zip(&record.measured[0]);
     // where no voltage was measured the current that was set is all that is known
@@ -281,18 +336,20 @@ fn followed(problem: &Problem, (index, n): (usize, usize), values: &[f64]) -> St
     let most = all.iter().map(|(r, _)| r * r).fold(share, f64::max);
     if most < ALIKE * ALIKE {
         let [_, load, duty, _, _, time] = all.map(|(r, _)| r);
-        return format!(
+        let words = format!(
             "slow, following neither duty nor load nor time alone (correlations {duty:.2}, {load:.2}, {time:.2})"
         );
+        return (most, words);
     }
-    match all.iter().find(|(r, _)| r * r > most - AS_WELL) {
+    let words = match all.iter().find(|(r, _)| r * r > most - AS_WELL) {
         Some((r, words)) => format!("{words} (correlation {r:.2})"),
         None => format!(
             "a step of {} at t = {:.4} s",
             si(step * problem.sigma[n], CHANNEL_UNITS[n]),
             record.time[at]
         ),
-    }
+    };
+    (most, words)
 }
 
 /// Whether the inductor current rests within the period of a row.

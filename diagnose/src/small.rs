@@ -149,6 +149,12 @@ pub(crate) fn disorder(problem: &Problem, state: &State, index: usize) -> Option
     })
 }
 
+/// Whether every record is in such disorder: what no filter lets through no cause makes, and none is sought.
+#[must_use]
+pub fn is_disordered(problem: &Problem, state: &State) -> bool {
+    !problem.records.is_empty() && (0..problem.records.len()).all(|index| disorder(problem, state, index).is_some())
+}
+
 #[cfg(test)]
 mod tests {
     use super::most_of_noise;

@@ -11,8 +11,9 @@ use crate::timing;
 /// Rivals of a cause that the sentence names; a reader remembers no more, and the rest stands in the list.
 const MOST_SAID: usize = 3;
 
-/// The verdict in a sentence; `aside` was left out of what was `found`, whose structure then is what it leaves there.
-pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>) -> String {
+/// The verdict in a sentence; `aside` was left out of what was `found`, whose structure then is what it leaves there. `left` is what is left
+/// where nothing explains it.
+pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>, left: &[Structure]) -> String {
     let lines = shapes(&found.lines);
     let beside = match found.lines.is_empty() {
         true => String::new(),
@@ -28,10 +29,9 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>) -> St
             )
         }
         Verdict::Unexplained => {
-            let all: Vec<Structure> = found.structure.iter().chain(&found.lines).cloned().collect();
-            let left = match all.is_empty() {
+            let left = match left.is_empty() {
                 true => String::new(),
-                false => format!("; left is {}", shapes(&all)),
+                false => format!("; left is {}", shapes(left)),
             };
             if found.fits_training_alone() {
                 let doubts = doubts::said(&found.doubts).join("; ");
@@ -114,11 +114,11 @@ fn values(causes: &[Named]) -> String {
 /// record of a hundred rows and more.
 const BELOW: f64 = 0.9;
 
-/// The noise beside an error of the better model: second differences of a record that rings see its bends as noise.
+/// The noise beside an error of the better model, which is less where rounding or a ring was taken for noise.
 pub fn noise(after: f64, floor: f64, of: &'static str) -> String {
     let said = si(floor, of);
     match after < BELOW * floor {
-        true => format!("{said} as estimated from neighbouring rows, which is high where a record rings"),
+        true => format!("{said} as estimated from neighbouring rows, which is more than what is left"),
         false => said,
     }
 }
@@ -187,8 +187,9 @@ pub fn needs(values: &[RivalValue]) -> String {
 }
 
 /// Said where nothing explains the records: which causes come nearest, and the share of the error above the noise that they take away.
-/// Intervals would claim more than is known. `fits_training` if nothing but the held-out records speaks against them.
-pub fn nearest(partial: &[Named], removed: f64, fits_training: bool) -> String {
+/// Intervals would claim more than is known. `fits_training` if nothing but the held-out records speaks against them; `left` is what they
+/// leave, of which the channel that is farthest off is told.
+pub fn nearest(partial: &[Named], removed: f64, fits_training: bool, left: &[Structure]) -> String {
     let one = |cause: &Named| {
         let values = cause.parameters.iter().map(|(name, v)| {
             let unit = unit(v.unit);
@@ -213,11 +214,23 @@ pub fn nearest(partial: &[Named], removed: f64, fits_training: bool) -> String {
             " Nearest comes {}. That takes away the error above the noise as a whole, but what was said above speaks against it.",
             list.join("; with ")
         ),
-        false => format!(
-            " Nearest comes {}. That takes away {:.0} % of the error above the noise: too little for an explanation.",
+        // what forbids it is no structure, and has been said above
+        false if left.is_empty() => format!(
+            " Nearest comes {}. That takes away {:.0} % of the error above the noise, but what was said above speaks against it.",
             list.join("; with "),
             100.0 * removed
         ),
+        false => {
+            let worst = left.iter().max_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
+            let rest = worst.map_or(String::new(), |one| {
+                format!(", which leaves {}", shapes(std::slice::from_ref(one)))
+            });
+            format!(
+                " Nearest comes {}{rest}. That takes away {:.0} % of the error above the noise: too little for an explanation.",
+                list.join("; with "),
+                100.0 * removed
+            )
+        }
     }
 }
 

@@ -220,6 +220,27 @@ fn nonsense_over_time() -> Vec<(String, Table)> {
     list
 }
 
+/// No filter lets rows in disorder through, so that no cause is sought: a search in thousands of rows takes its longest and finds nothing.
+#[test]
+fn rows_in_disorder_are_not_searched() {
+    let mut random = Noise(61);
+    let table = permuted(record(&Bench::default(), 900, true), "i_l", &mut random);
+    let table = permuted(
+        replaced(table, "v_out", |d, at| 200.0 * d + 40.0 * (at - 0.5)),
+        "v_out",
+        &mut random,
+    );
+    let found = ended("rows in disorder", &table.measured(&OF_ROWS, &mut random), &model()).unwrap();
+    assert_eq!(found.findings.verdict, Verdict::Unexplained);
+    assert!(
+        found.findings.sentence.contains("lets through"),
+        "{}",
+        found.findings.sentence
+    );
+    let null = found.attribution.null.chi2;
+    assert!(found.attribution.singles.iter().all(|single| single.state.chi2 == null));
+}
+
 #[test]
 fn settled_points_that_no_buck_gives_are_never_explained() {
     none_explains(settled_nonsense());

@@ -2,6 +2,7 @@
 
 use super::{channel, scatter};
 use crate::drive::sensors;
+use crate::flicker;
 use crate::median::median;
 use crate::problem::Problem;
 use crate::record::Record;
@@ -98,6 +99,17 @@ fn scatter_of(values: &[f64]) -> f64 {
     let second = values.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2));
     // a second difference has six times the variance
     (second.sum::<f64>() / (values.len() - 2) as f64 / 6.0).sqrt()
+}
+
+/// A meter that flickers between digits is off by the same in all rows: the standard deviation that leaves their mean no more than two of
+/// its own to see that by. 0 for any other channel.
+pub(super) fn rounded(problem: &Problem, n: usize) -> f64 {
+    let in_time = problem.records.iter().filter(|record| !record.settled);
+    let biased = in_time.map(|record| {
+        let count = record.measured[n].iter().filter(|v| v.is_finite()).count() as f64;
+        0.5 * count.sqrt() * flicker::bias(&record.measured[n])
+    });
+    biased.fold(0.0, f64::max)
 }
 
 /// A meter of settled points that shows a few values again and again lies on steps as far apart as these: no less than rounding to them

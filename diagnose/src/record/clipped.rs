@@ -1,6 +1,7 @@
 //! Signals that reach the end of their instrument's range.
 
 use super::channels::FEWEST;
+use crate::flicker::digit;
 use crate::noise::scatter;
 
 /// Rows at one extreme value: chance puts two or three of a noisy signal there.
@@ -19,6 +20,10 @@ pub fn at(values: &[f64], step: f64) -> Option<(f64, usize)> {
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     if known.len() < FEWEST || noise.is_nan() || noise < 2.0 * step || high - low < MOVES * noise {
+        return None;
+    }
+    // one that goes between a few digits has its middle at an end
+    if digit(&known) > 0.0 {
         return None;
     }
     [high, low].into_iter().find_map(|end| {

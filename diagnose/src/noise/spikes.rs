@@ -1,0 +1,179 @@
+//! Single wild rows: a wrong bit, a lost byte, a cable that was touched.
+
+use super::channel;
+use crate::problem::Problem;
+use crate::record::{CHANNEL_NAMES, CHANNELS};
+
+/// An outlier differs from its neighbours by more than this many standard deviations beyond their own spread. Normal noise does
+/// so in one row of 1e15, at half of it in one of 1e6; at double, a wrong bit of 16 steps of the noise would pass.
+const FAR: f64 = 8.0;
+/// An outlier.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outlier {
+    /// Which record.
+    pub record: usize,
+    /// Which row.
+    pub row: usize,
+    /// Which channel.
+    pub channel: usize,
+}
+
+/// Rows that leap out of the measured signal and of the residual alike.
+#[must_use]
+pub fn outliers(problem: &Problem, residual: &[f64]) -> Vec<Outlier> {
+    let mut found = Vec::new();
+    for (index, record) in problem.records.iter().enumerate().filter(|(_, r)| !r.settled) {
+        for n in 0..CHANNELS {
+            let left = channel(problem, residual, index, n);
+            let raw: Vec<f64> = record.measured[n].iter().map(|v| v / problem.sigma[n]).collect();
+            for row in 2..record.rows().saturating_sub(2) {
+                // both: what leaps in the signal alone the model explains, what leaps in the residual alone it brings
+                let alone = leaps(&left, row) && (leaps(&raw, row) || leaps_off_curve(&raw, row));
+                if alone || leaps_in_a_pair(&left, row) && leaps_in_a_pair(&raw, row) {
+                    found.push(Outlier {
+                        record: index,
+                        row,
+                        channel: n,
+                    });
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Whether a row lies apart from its neighbours, beyond their own spread.
+fn leaps(values: &[f64], row: usize) -> bool {
+    let near = [values[row - 2], values[row - 1], values[row + 1], values[row + 2]];
+    let (low, high) = near
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let apart = (values[row] - high).max(low - values[row]);
+    near.iter().all(|v| v.is_finite()) && apart > FAR + (high - low)
+}
+
+/// Of two wild rows beside each other each hides the other, and has to leap this many times as far as one alone: an event of the converter may
+/// last two rows.
+const OF_A_PAIR: f64 = 4.0;
+
+/// Whether a row and one beside it both lie apart from the two rows before and the two behind them.
+fn leaps_in_a_pair(values: &[f64], row: usize) -> bool {
+    let at = |by: isize| row.checked_add_signed(by).and_then(|row| values.get(row).copied());
+    let pair = |other: isize| {
+        let (before, after) = (other.min(0), other.max(0));
+        let near: Option<Vec<f64>> = [before - 2, before - 1, after + 1, after + 2]
+            .into_iter()
+            .map(at)
+            .collect();
+        let near = near.filter(|near| near.iter().all(|v| v.is_finite()));
+        near.zip(at(other)).is_some_and(|(near, other)| {
+            let ends = (f64::INFINITY, f64::NEG_INFINITY);
+            let (low, high) = near.iter().fold(ends, |(low, high), v| (low.min(*v), high.max(*v)));
+            let is_apart = |v: f64| (v - high).max(low - v) > OF_A_PAIR * (FAR + high - low);
+            is_apart(values[row]) && is_apart(other)
+        })
+    };
+    pair(-1) || pair(1)
+}
+
+/// A row lies off the curve through its neighbours this many times as far as rows near it do: a signal that swings bends everywhere.
+const OFF_CURVE: f64 = 4.0;
+
+/// Distance to the cubic curve through two neighbours on each side; nothing at an end or beside a hole.
+fn off_curve(values: &[f64], row: usize) -> Option<f64> {
+    let at = |by: isize| row.checked_add_signed(by).and_then(|row| values.get(row).copied());
+    let curve = (4.0 * (at(-1)? + at(1)?) - at(-2)? - at(2)?) / 6.0;
+    Some((values[row] - curve).abs()).filter(|off| off.is_finite())
+}
+
+/// Whether a row leaps out of a signal that swings, which hides a leap in the spread of its neighbours.
+fn leaps_off_curve(values: &[f64], row: usize) -> bool {
+    // the curves three and four rows further on do not go through this one
+    let near = [-4_isize, -3, 3, 4].map(|by| row.checked_add_signed(by).and_then(|row| off_curve(values, row)));
+    let known: Vec<f64> = near.into_iter().flatten().collect();
+    let usual = known.iter().copied().fold(0.0, f64::max);
+    // at a step one of the neighbours lies where the row lies
+    let [before, after] = [row - 1, row + 1].map(|other| values[row] - values[other]);
+    // the curves of its neighbours go through a leap, and lie off by two thirds of it
+    let beside = [row - 1, row + 1].map(|other| off_curve(values, other).unwrap_or(0.0));
+    let is_single = |off: f64| {
+        before * after > 0.0 && before.abs().min(after.abs()) > 0.5 * off && beside.iter().all(|other| *other < off)
+    };
+    known.len() >= 3
+        && off_curve(values, row).is_some_and(|off| off > 2.0 * FAR && off > OFF_CURVE * usual && is_single(off))
+}
+
+/// Outliers that one sentence lists; a reader looks at no more.
+const LISTED: usize = 3;
+
+/// What is said of outliers.
+#[must_use]
+pub fn spikes(problem: &Problem, outliers: &[Outlier]) -> Option<String> {
+    let place = |one: &Outlier| {
+        let record = &problem.records[one.record];
+        format!(
+            "{} of {} at t = {:.6} s",
+            CHANNEL_NAMES[one.channel], record.name, record.time[one.row]
+        )
+    };
+    let listed: Vec<String> = outliers.iter().take(LISTED).map(place).collect();
+    let more = match outliers.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    (!outliers.is_empty()).then(|| format!("spikes of single rows are left out: {}{more}", listed.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::normal;
+    use super::{leaps_in_a_pair, leaps_off_curve};
+
+    #[test]
+    fn a_spike_on_a_swing_is_seen_and_a_step_or_a_swing_is_none() {
+        let mut state = 7;
+        let swing: Vec<f64> = (0..200)
+            .map(|n| 100.0 * (f64::from(n) * 0.3).sin() + normal(&mut state))
+            .collect();
+        let mut spiked = swing.clone();
+        spiked[93] += 60.0;
+        let step: Vec<f64> = (0..200)
+            .map(|n| if n < 77 { 0.0 } else { 80.0 } + normal(&mut state))
+            .collect();
+        let seen = |values: &[f64]| {
+            (2..198)
+                .filter(|row| leaps_off_curve(values, *row))
+                .collect::<Vec<usize>>()
+        };
+        assert_eq!(seen(&spiked), [93]);
+        assert!(seen(&swing).is_empty() && seen(&step).is_empty());
+    }
+
+    #[test]
+    fn two_spikes_beside_each_other_are_seen_and_a_swing_a_step_or_a_kick_are_none() {
+        let mut state = 9;
+        let quiet: Vec<f64> = (0..200)
+            .map(|n| 20.0 * (f64::from(n) * 0.2).sin() + normal(&mut state))
+            .collect();
+        let mut spiked = quiet.clone();
+        (spiked[70], spiked[71]) = (spiked[70] + 150.0, spiked[71] - 120.0);
+        (spiked[140], spiked[141]) = (spiked[140] - 90.0, spiked[141] - 110.0);
+        let mut moved = quiet.clone();
+        for (n, value) in moved.iter_mut().enumerate().skip(50) {
+            // a step, and a kick that dies in some rows
+            *value += 300.0
+                + if n > 120 {
+                    200.0 * (-(n as f64 - 121.0) / 4.0).exp()
+                } else {
+                    0.0
+                };
+        }
+        let seen = |values: &[f64]| {
+            (2..198)
+                .filter(|row| leaps_in_a_pair(values, *row))
+                .collect::<Vec<usize>>()
+        };
+        assert_eq!(seen(&spiked), [70, 71, 140, 141]);
+        assert!(seen(&quiet).is_empty() && seen(&moved).is_empty());
+    }
+}

@@ -164,13 +164,12 @@ impl Terms {
         let ("bvand", [a, b]) = self.of_words(term)? else {
             return None;
         };
-        let found = [(a, b), (b, a)].into_iter().find_map(|(difference, other)| {
+        [(a, b), (b, a)].into_iter().find_map(|(difference, other)| {
             let ("bvsub", [constant, x]) = self.of_words(difference)? else {
                 return None;
             };
             fits(x, other).then_some((self.known(constant)?, x))
-        });
-        found
+        })
     }
 
     /// The sign of `x | -x`: whether any bit is set.

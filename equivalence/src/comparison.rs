@@ -5,20 +5,12 @@ use crate::term::{Comparison, Op, Term, Terms};
 
 impl Terms {
     /// The operands of a comparison of numbers.
-    fn compared(&self, x: Term) -> Option<(Comparison, [Term; 2])> {
+    pub(crate) fn compared(&self, x: Term) -> Option<(Comparison, [Term; 2])> {
         let node = self.node(x);
         match (&node.op, node.args.as_slice()) {
             (Op::Float(comparison), &[x, y]) => Some((*comparison, [x, y])),
             _ => None,
         }
-    }
-
-    /// Whether `y` is `a == a`, which says that `a` is no NaN, and `x` is another comparison of `a`, which says so too.
-    pub(crate) fn implies_number(&self, x: Term, y: Term) -> bool {
-        let Some((Comparison::Equal, [a, b])) = self.compared(y) else {
-            return false;
-        };
-        a == b && self.compared(x).is_some_and(|(_, args)| args.contains(&a))
     }
 
     /// A comparison of a number with itself, with a NaN, or of two constants; an equality has its operands in the order of the store.
@@ -36,10 +28,75 @@ impl Terms {
             }
             _ => {}
         }
-        match comparison {
-            Comparison::Less if x == y => Some(self.truth(false)),
-            Comparison::LessOrEqual if x == y => Some(self.compare(Comparison::Equal, x, y)),
-            Comparison::Equal if y < x => Some(self.compare(Comparison::Equal, y, x)),
+        self.with_infinity(comparison, [x, y], values)
+            .or_else(|| self.with_zero(comparison, [x, y], values))
+            .or_else(|| self.with_choice(comparison, x, y))
+            .or_else(|| self.mirrored(comparison, x, y))
+            .or_else(|| match comparison {
+                Comparison::Less if x == y => Some(self.truth(false)),
+                Comparison::LessOrEqual if x == y => Some(self.compare(Comparison::Equal, x, y)),
+                Comparison::Equal if y < x => Some(self.compare(Comparison::Equal, y, x)),
+                _ => None,
+            })
+    }
+
+    /// Every number lies between the infinities.
+    fn with_infinity(&self, comparison: Comparison, [x, y]: [Term; 2], values: [Option<f64>; 2]) -> Option<Term> {
+        let (low, high) = (Some(f64::NEG_INFINITY), Some(f64::INFINITY));
+        match (comparison, values) {
+            (Comparison::LessOrEqual, [value, _]) if value == low => Some(self.compare(Comparison::Equal, y, y)),
+            (Comparison::LessOrEqual, [_, value]) if value == high => Some(self.compare(Comparison::Equal, x, x)),
+            (Comparison::Less, [value, _]) if value == high => Some(self.truth(false)),
+            (Comparison::Less, [_, value]) if value == low => Some(self.truth(false)),
+            _ => None,
+        }
+    }
+
+    /// Both zeros are one number: of a constant the one without a sign.
+    fn with_zero(&self, comparison: Comparison, [x, y]: [Term; 2], values: [Option<f64>; 2]) -> Option<Term> {
+        let is_negative = |value: Option<f64>| value.is_some_and(|value| value == 0.0 && value.is_sign_negative());
+        match values.map(is_negative) {
+            [true, _] => Some(self.compare(comparison, self.bits(0, self.width(x)), y)),
+            [_, true] => Some(self.compare(comparison, x, self.bits(0, self.width(y)))),
+            _ => None,
+        }
+    }
+
+    /// `-x` beside a constant is x beside the constant with the other sign.
+    fn mirrored(&self, comparison: Comparison, x: Term, y: Term) -> Option<Term> {
+        let width = self.width(x);
+        let sign = self.bits(1 << (width - 1), width);
+        let negative = |x: Term| {
+            let node = self.node(x);
+            match (&node.op, node.args.as_slice()) {
+                (Op::Bits("bvxor"), &[x, by]) if by == sign => Some(x),
+                _ => None,
+            }
+        };
+        let constant = |x: Term| Some(self.bits(self.known(x)? ^ self.known(sign)?, width));
+        let (x, y) = match (negative(x), negative(y)) {
+            (Some(x), None) => (x, constant(y)?),
+            (None, Some(y)) => (constant(x)?, y),
+            _ => return None,
+        };
+        Some(self.compare(comparison, y, x))
+    }
+
+    /// A choice between a constant and something else, compared with a constant or with itself: of the one it is known at once.
+    fn with_choice(&self, comparison: Comparison, x: Term, y: Term) -> Option<Term> {
+        let parts = |x: Term| {
+            let choice = self.choice(x);
+            choice.filter(|[_, yes, no]| self.known(*yes).is_some() || self.known(*no).is_some())
+        };
+        let each = |condition: Term, yes: [Term; 2], no: [Term; 2]| {
+            let of = |[x, y]: [Term; 2]| self.compare(comparison, x, y);
+            self.choose(condition, of(yes), of(no))
+        };
+        let (left, right) = (parts(x), parts(y));
+        match (left, right) {
+            (Some([condition, yes, no]), _) if x == y => Some(each(condition, [yes, yes], [no, no])),
+            (Some([condition, yes, no]), _) if self.known(y).is_some() => Some(each(condition, [yes, y], [no, y])),
+            (_, Some([condition, yes, no])) if self.known(x).is_some() => Some(each(condition, [x, yes], [x, no])),
             _ => None,
         }
     }

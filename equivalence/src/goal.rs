@@ -47,10 +47,13 @@ pub(crate) struct Assumption {
 /// That the pairs are equal wherever the assumptions hold.
 pub(crate) fn equal(float: Float<'_>, name: String, claim: String, pairs: &[Pair], given: &[Assumption]) -> Goal {
     let terms = float.terms;
-    let same = pairs.iter().map(|pair| terms.equal(pair.emitted, pair.specified));
     let shown: Vec<Term> = pairs.iter().flat_map(|pair| [pair.emitted, pair.specified]).collect();
     let asserted: Vec<Term> = given.iter().map(|assumption| assumption.term).collect();
-    let script = script(terms, &asserted, terms.all(same), &shown, Arithmetic::Uninterpreted);
+    let same = pairs
+        .iter()
+        .map(|pair| terms.same_under(&asserted, pair.emitted, pair.specified));
+    let truth = terms.all(same);
+    let script = script(terms, &asserted, truth, &shown, Arithmetic::Uninterpreted);
     let mut shown = inputs(float, &script);
     for pair in pairs {
         for (side, term) in [("emitted", pair.emitted), ("specified", pair.specified)] {

@@ -1,12 +1,14 @@
 //! Shows by SMT that the emitted C and Rust do what the contract says.
 
 mod c;
+mod choices;
 mod comparison;
 mod emitted;
 mod facts;
 mod float;
 mod goal;
 mod goals;
+mod guards;
 mod helpers;
 mod machine;
 mod refusal;
@@ -17,6 +19,8 @@ mod smt;
 mod solver;
 mod spec;
 mod term;
+mod truths;
+mod under;
 
 use policy::Policy;
 

@@ -220,17 +220,10 @@ impl<'a> Machine<'a> {
         let inside = self
             .terms
             .order("bvult", index.term, self.terms.bits(elements.len() as u64, width));
-        let mut numbers = elements
-            .iter()
-            .enumerate()
-            .rev()
-            .map(|(n, element)| (n, number(element)));
-        let (_, last) = numbers.next().ok_or("an index into an empty array")?;
-        let mut chosen = last?;
-        for (n, element) in numbers {
-            let this = self.terms.equal(index.term, self.terms.bits(n as u64, width));
-            chosen.term = self.terms.choose(this, element?.term, chosen.term);
-        }
+        let numbers: Vec<Number> = elements.iter().map(number).collect::<Result<_, _>>()?;
+        let mut chosen = *numbers.last().ok_or("an index into an empty array")?;
+        let entries: Vec<Term> = numbers.iter().map(|number| number.term).collect();
+        chosen.term = self.terms.entry(index.term, &entries).unwrap_or(chosen.term);
         self.obligations.push(inside);
         Ok(Value::Number(chosen))
     }

@@ -1,5 +1,6 @@
 //! Goals to a solver, several at a time, and what it answers in words.
 
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::thread;
@@ -70,20 +71,26 @@ pub fn run(
     mut done: impl FnMut(&Claim),
 ) -> Vec<Claim> {
     let next = AtomicUsize::new(0);
+    let groups = alike(goals);
     let mut claims: Vec<Option<Claim>> = vec![None; goals.len()];
     thread::scope(|scope| {
         let (answers, heard) = mpsc::channel();
         for _ in 0..options.parallel.max(1) {
-            let (answers, next) = (answers.clone(), &next);
+            let (answers, next, groups) = (answers.clone(), &next, &groups);
             scope.spawn(move || {
-                loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(goal) = goals.get(index) else { return };
-                    if answers
-                        .send((index, decide(goal, solver, options.limit, interrupt)))
-                        .is_err()
-                    {
-                        return;
+                let ask = |index: &usize| decide(&goals[*index], solver, options.limit, interrupt);
+                while let Some(group) = groups.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let mut first: Option<Claim> = None;
+                    for index in group {
+                        let claim = match &first {
+                            // a refutation names the values of each
+                            Some(claim) if claim.verdict == Verdict::Proved => of_twin(&goals[*index], claim),
+                            _ => ask(index),
+                        };
+                        if answers.send((*index, claim.clone())).is_err() {
+                            return;
+                        }
+                        first.get_or_insert(claim);
                     }
                 }
             });
@@ -95,6 +102,30 @@ pub fn run(
         }
     });
     claims.into_iter().flatten().collect()
+}
+
+/// Places of goals that are one text: where C and Rust have become the same terms, one answer is the answer of both.
+fn alike(goals: &[Goal]) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    let mut known: HashMap<&str, usize> = HashMap::new();
+    for (index, goal) in goals.iter().enumerate() {
+        let group = *known.entry(&goal.text).or_insert(groups.len());
+        match groups.get_mut(group) {
+            Some(group) => group.push(index),
+            None => groups.push(vec![index]),
+        }
+    }
+    groups
+}
+
+/// What is proved of a goal with the same text, which took no time.
+fn of_twin(goal: &Goal, proved: &Claim) -> Claim {
+    Claim {
+        name: goal.name.clone(),
+        claim: goal.claim.clone(),
+        seconds: 0.0,
+        ..proved.clone()
+    }
 }
 
 fn decide(goal: &Goal, solver: &Solver, limit: Duration, interrupt: &AtomicBool) -> Claim {
@@ -169,5 +200,23 @@ fn in_words(shown: &Shown, bits: u64) -> String {
         Kind::Float(Scalar::F64) => format!("{label} = {:?} (0x{bits:016X})", f64::from_bits(bits)),
         Kind::Integer { bits: 32, signed: true } => format!("{label} = {}", bits as u32 as i32),
         _ => format!("{label} = {bits}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn goals_of_one_text_are_one_group() {
+        let goal = |name: &str, text: &str| Goal {
+            name: name.into(),
+            claim: String::new(),
+            assumptions: Vec::new(),
+            text: text.into(),
+            shown: Vec::new(),
+        };
+        let goals = [goal("c.duty", "x"), goal("c.step", "y"), goal("rust.duty", "x")];
+        assert_eq!(alike(&goals), [vec![0, 2], vec![1]]);
     }
 }

@@ -3,11 +3,11 @@
 //!
 //! Every rule holds for all bits; the tests compare what they give with values computed without them.
 
-use crate::term::{Op, Term, Terms, mask};
+use crate::term::{Op, Sort, Term, Terms, mask};
 
 impl Terms {
     /// The parts of a choice.
-    fn choice(&self, x: Term) -> Option<[Term; 3]> {
+    pub(crate) fn choice(&self, x: Term) -> Option<[Term; 3]> {
         let node = self.node(x);
         match (&node.op, node.args.as_slice()) {
             (Op::Choose, &[condition, yes, no]) => Some([condition, yes, no]),
@@ -16,56 +16,17 @@ impl Terms {
     }
 
     /// A choice between two constants.
-    fn constants(&self, x: Term) -> Option<(Term, u64, u64)> {
+    pub(crate) fn constants(&self, x: Term) -> Option<(Term, u64, u64)> {
         let [condition, yes, no] = self.choice(x)?;
         Some((condition, self.known(yes)?, self.known(no)?))
     }
 
     /// `value` where a condition holds, and 0 elsewhere.
-    fn flag(&self, x: Term) -> Option<(Term, u64)> {
+    pub(crate) fn flag(&self, x: Term) -> Option<(Term, u64)> {
         match self.constants(x)? {
             (condition, value, 0) => Some((condition, value)),
             (condition, 0, value) => Some((self.not(condition), value)),
             _ => None,
-        }
-    }
-
-    /// What is negated.
-    pub(crate) fn negated(&self, x: Term) -> Option<Term> {
-        let node = self.node(x);
-        match (&node.op, node.args.as_slice()) {
-            (Op::Not, &[inner]) => Some(inner),
-            _ => None,
-        }
-    }
-
-    fn is_opposite(&self, x: Term, y: Term) -> bool {
-        self.negated(x) == Some(y) || self.negated(y) == Some(x)
-    }
-
-    /// `x and y` of truths that belong together.
-    pub(crate) fn simple_and(&self, x: Term, y: Term) -> Option<Term> {
-        match x == y {
-            true => Some(x),
-            false if self.is_opposite(x, y) => Some(self.truth(false)),
-            false => match (self.implies_number(x, y), self.implies_number(y, x)) {
-                (true, _) => Some(x),
-                (_, true) => Some(y),
-                _ => None,
-            },
-        }
-    }
-
-    /// `x or y` of truths that belong together.
-    pub(crate) fn simple_or(&self, x: Term, y: Term) -> Option<Term> {
-        match x == y {
-            true => Some(x),
-            false if self.is_opposite(x, y) => Some(self.truth(true)),
-            false => match (self.implies_number(x, y), self.implies_number(y, x)) {
-                (true, _) => Some(y),
-                (_, true) => Some(x),
-                _ => None,
-            },
         }
     }
 
@@ -74,21 +35,47 @@ impl Terms {
         if yes == no {
             return Some(yes);
         }
-        if let Some(inner) = self.negated(condition) {
-            return Some(self.choose(inner, no, yes));
+        if self.sort(yes) == Sort::Truth
+            && let Some(truth) = self.choice_of_truths(condition, yes, no)
+        {
+            return Some(truth);
         }
-        match (self.choice(yes), self.choice(no)) {
-            (Some([same, yes, _]), _) if same == condition => Some(self.choose(condition, yes, no)),
-            (_, Some([same, _, no])) if same == condition => Some(self.choose(condition, yes, no)),
-            _ => None,
+        // of a condition and its opposite the one that was made first
+        let opposite = self.not(condition);
+        if opposite < condition {
+            return Some(self.choose(opposite, no, yes));
+        }
+        if let Some([inner, a, b]) = self.choice(yes) {
+            match () {
+                () if inner == condition => return Some(self.choose(condition, a, no)),
+                () if no == b => return Some(self.choose(self.and(condition, inner), a, b)),
+                () if no == a => return Some(self.choose(self.or(opposite, inner), a, b)),
+                () => {}
+            }
+        }
+        let [inner, a, b] = self.choice(no)?;
+        match () {
+            () if inner == condition => Some(self.choose(condition, yes, b)),
+            () if yes == a => Some(self.choose(self.or(condition, inner), a, b)),
+            () if yes == b => Some(self.choose(self.and(opposite, inner), a, b)),
+            () => None,
         }
     }
 
-    /// Whether a choice between two constants gives a third.
+    /// Whether a choice between two constants gives a third; whether a number is still itself behind a clamp.
     pub(crate) fn simple_equal(&self, x: Term, y: Term) -> Option<Term> {
         if x == y {
             return Some(self.truth(true));
         }
+        self.equal_choice(x, y)
+            .or_else(|| self.equal_sums(x, y))
+            .or_else(|| self.unclamped(x, y))
+            .or_else(|| self.unclamped(y, x))
+            .or_else(|| self.is_zero(x, y))
+            .or_else(|| self.is_zero(y, x))
+    }
+
+    fn equal_choice(&self, x: Term, y: Term) -> Option<Term> {
         let (choice, value) = match (self.constants(x), self.constants(y)) {
             (Some(choice), None) => (choice, self.known(y)?),
             (None, Some(choice)) => (choice, self.known(x)?),
@@ -120,11 +107,35 @@ impl Terms {
     /// An operation of two operands of one width.
     pub(crate) fn simple_binary(&self, name: &'static str, x: Term, y: Term) -> Option<Term> {
         self.neutral(name, x, y)
+            .or_else(|| self.single_bit(name, x, y))
             .or_else(|| self.difference(name, x, y))
             .or_else(|| self.of_flags(name, x, y))
             .or_else(|| self.counted(name, x, y))
             .or_else(|| self.of_one_choice(name, x, y))
             .or_else(|| self.masked(name, x, y))
+            .or_else(|| self.raised(name, x, y))
+            .or_else(|| self.joined(name, x, y))
+            .or_else(|| self.joined(name, y, x))
+    }
+
+    /// Operands that may be exchanged: a constant last, others in the order of the store.
+    pub(crate) fn in_order(&self, name: &'static str, x: Term, y: Term) -> [Term; 2] {
+        let commutes = matches!(name, "bvadd" | "bvand" | "bvor" | "bvxor" | "bvmul");
+        let is_late = |x: Term| (self.known(x).is_some(), x);
+        match commutes && is_late(y) < is_late(x) {
+            true => [y, x],
+            false => [x, y],
+        }
+    }
+
+    /// The lowest or the highest bit of a word is a flag.
+    fn single_bit(&self, name: &'static str, x: Term, y: Term) -> Option<Term> {
+        let width = self.width(x);
+        match (name, self.known(y)?) {
+            ("bvand", 1) => Some(self.number(self.bit(x, 0), width)),
+            ("bvlshr", by) if by == u64::from(width) - 1 => Some(self.number(self.bit(x, width - 1), width)),
+            _ => None,
+        }
     }
 
     /// A constant that changes nothing, or decides.
@@ -212,19 +223,19 @@ impl Terms {
         simple.then(|| self.choose(condition, self.binary(name, a, c), self.binary(name, b, d)))
     }
 
-    /// What a mask of all bits or none leaves.
+    /// What a mask leaves that is 0 where a condition fails.
     fn masked(&self, name: &'static str, x: Term, y: Term) -> Option<Term> {
-        let width = self.width(x);
-        let keeps = |mask_term: Term| self.flag(mask_term).filter(|(_, value)| *value == mask(width));
         if name != "bvand" {
             return None;
         }
-        let ((condition, _), other) = match (keeps(y), keeps(x)) {
+        let ((condition, value), other) = match (self.flag(y), self.flag(x)) {
             (Some(flag), _) => (flag, x),
             (None, Some(flag)) => (flag, y),
             (None, None) => return None,
         };
-        Some(self.choose(condition, other, self.bits(0, width)))
+        let width = self.width(x);
+        let kept = self.binary(name, other, self.bits(value, width));
+        Some(self.choose(condition, kept, self.bits(0, width)))
     }
 }
 
@@ -262,6 +273,7 @@ mod tests {
             }
             (Op::Equal, &[x, y]) => u64::from(x == y),
             (Op::Bits(name), &[x]) => of_one(name, x),
+            (Op::Bits("bvule"), &[x, y]) => u64::from(x <= y),
             (Op::Bits(name), &[x, y]) => of_two(name, x, y),
             (Op::Extract(_, low), &[x]) => (x >> low) & mask(width),
             (Op::ZeroExtend(_), &[x]) => x,

@@ -53,6 +53,19 @@ parser.parse(sys.stdin.read(), parse_only=False, parse_file=False)
 const PYTHON_WORK: &str = "4000000 questions of Bitwuzla's search whether to go on";
 const PYTHON_VERSION: &str = "import bitwuzla, importlib.metadata as m; print(m.version('bitwuzla'))";
 
+/// cvc5 as a Python package, which brings no program along: command by command, with the limit of the program.
+const PYTHON_CVC5: &str = "import sys, cvc5
+solver = cvc5.Solver(cvc5.TermManager())
+solver.setOption('produce-models', 'true')
+solver.setOption('rlimit-per', '10000000')
+parser = cvc5.InputParser(solver)
+parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, sys.stdin.read(), 'goal')
+symbols = parser.getSymbolManager()
+while not (command := parser.nextCommand()).isNull():
+    print(command.invoke(solver, symbols), end='')
+";
+const PYTHON_CVC5_VERSION: &str = "import cvc5, importlib.metadata as m; print(m.version('cvc5'))";
+
 /// How often a running solver is looked at.
 const LOOK: Duration = Duration::from_millis(2);
 /// A program that does not say its version by then is not used.
@@ -73,8 +86,14 @@ impl Solver {
                 arguments,
                 work,
             }));
-            if name == "bitwuzla" && found.is_empty() {
-                found.extend(Solver::in_python(Path::new("python3")));
+            if found.iter().all(|solver| solver.name != name) {
+                let python = Path::new("python3");
+                found.extend(match name {
+                    "bitwuzla" => Solver::in_python(python),
+                    "cvc5" => Solver::package(python, (name, work), PYTHON_CVC5_VERSION, PYTHON_CVC5),
+                    // its package has the program
+                    _ => None,
+                });
             }
         }
         found
@@ -83,13 +102,23 @@ impl Solver {
     /// The Python package `bitwuzla`, if that interpreter has it.
     #[must_use]
     pub fn in_python(python: &Path) -> Option<Solver> {
-        let version = said(python, &["-c", PYTHON_VERSION])?;
+        Solver::package(python, ("bitwuzla", Some(PYTHON_WORK)), PYTHON_VERSION, PYTHON)
+    }
+
+    /// A solver that a Python program drives.
+    fn package(
+        python: &Path,
+        (name, work): (&'static str, Option<&'static str>),
+        version: &str,
+        text: &str,
+    ) -> Option<Solver> {
+        let version = said(python, &["-c", version])?;
         Some(Solver {
-            name: "bitwuzla",
+            name,
             version: format!("{} in Python", number_in(&version)),
             program: python.to_owned(),
-            arguments: vec!["-c".into(), PYTHON.into()],
-            work: Some(PYTHON_WORK),
+            arguments: vec!["-c".into(), text.into()],
+            work,
         })
     }
 

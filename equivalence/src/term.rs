@@ -72,6 +72,8 @@ pub(crate) struct Node {
 struct Store {
     nodes: Vec<Rc<Node>>,
     index: HashMap<Rc<Node>, Term, BuildHasherDefault<Mixed>>,
+    /// Truths whose opposite was made, both ways.
+    opposites: HashMap<Term, Term, BuildHasherDefault<Mixed>>,
 }
 
 /// A hash by one multiplication a word: whose keys come out of one file has nobody to defend against, and a run makes them by the
@@ -141,7 +143,8 @@ fn signed(value: u64, width: u32) -> i64 {
 }
 
 impl Terms {
-    fn make(&self, op: Op, args: Vec<Term>, sort: Sort) -> Term {
+    /// The term as it stands, without any rule.
+    pub(crate) fn make(&self, op: Op, args: Vec<Term>, sort: Sort) -> Term {
         let node = Rc::new(Node { op, args, sort });
         let mut store = self.store.borrow_mut();
         if let Some(term) = store.index.get(&node) {
@@ -212,38 +215,16 @@ impl Terms {
             .unwrap_or_else(|| self.make(Op::Float(comparison), vec![x, y], Sort::Truth))
     }
 
-    pub(crate) fn not(&self, x: Term) -> Term {
-        match (self.known(x), self.negated(x)) {
-            (Some(value), _) => self.truth(value == 0),
-            (None, Some(inner)) => inner,
-            (None, None) => self.make(Op::Not, vec![x], Sort::Truth),
-        }
+    /// The opposite of a truth, if it was made.
+    pub(crate) fn opposite(&self, x: Term) -> Option<Term> {
+        self.store.borrow().opposites.get(&x).copied()
     }
 
-    pub(crate) fn and(&self, x: Term, y: Term) -> Term {
-        match (self.known(x), self.known(y)) {
-            (Some(0), _) | (_, Some(0)) => self.truth(false),
-            (Some(_), _) => y,
-            (_, Some(_)) => x,
-            _ => self
-                .simple_and(x, y)
-                .unwrap_or_else(|| self.make(Op::And, vec![x, y], Sort::Truth)),
-        }
-    }
-
-    pub(crate) fn or(&self, x: Term, y: Term) -> Term {
-        match (self.known(x), self.known(y)) {
-            (Some(1), _) | (_, Some(1)) => self.truth(true),
-            (Some(_), _) => y,
-            (_, Some(_)) => x,
-            _ => self
-                .simple_or(x, y)
-                .unwrap_or_else(|| self.make(Op::Or, vec![x, y], Sort::Truth)),
-        }
-    }
-
-    pub(crate) fn all(&self, terms: impl IntoIterator<Item = Term>) -> Term {
-        terms.into_iter().fold(self.truth(true), |x, y| self.and(x, y))
+    /// Keeps that two truths are opposites; what was kept first stays.
+    pub(crate) fn keep_opposites(&self, x: Term, y: Term) {
+        let mut store = self.store.borrow_mut();
+        store.opposites.entry(x).or_insert(y);
+        store.opposites.entry(y).or_insert(x);
     }
 
     pub(crate) fn choose(&self, condition: Term, yes: Term, no: Term) -> Term {
@@ -269,6 +250,7 @@ impl Terms {
     /// Two-sided operations of one width: `bvadd`, `bvand`, ...
     pub(crate) fn binary(&self, name: &'static str, x: Term, y: Term) -> Term {
         let width = self.width(x);
+        let [x, y] = self.in_order(name, x, y);
         if let (Some(a), Some(b)) = (self.known(x), self.known(y))
             && let Some(value) = fold(name, a, b, width)
         {
@@ -290,7 +272,7 @@ impl Terms {
         }
     }
 
-    /// Orders of integers: `bvult`, `bvule`, `bvslt`, `bvsle`.
+    /// Orders of integers: `bvult`, `bvule`, `bvslt`, `bvsle`; of a strict one the opposite is made.
     pub(crate) fn order(&self, name: &'static str, x: Term, y: Term) -> Term {
         let width = self.width(x);
         if let (Some(a), Some(b)) = (self.known(x), self.known(y)) {
@@ -302,7 +284,12 @@ impl Terms {
                 _ => s <= t,
             });
         }
-        self.make(Op::Bits(name), vec![x, y], Sort::Truth)
+        match name {
+            // one word for one order
+            "bvult" => self.not(self.order("bvule", y, x)),
+            "bvslt" => self.not(self.order("bvsle", y, x)),
+            _ => self.make(Op::Bits(name), vec![x, y], Sort::Truth),
+        }
     }
 
     pub(crate) fn extract(&self, x: Term, high: u32, low: u32) -> Term {

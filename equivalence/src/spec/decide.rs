@@ -174,15 +174,9 @@ fn argmax(spec: Spec<'_>, q_values: &[Term]) -> Term {
 
 /// The entry of the table of duties.
 fn chosen_duty(spec: Spec<'_>, head: &Head, index: Term) -> Term {
-    let terms = spec.terms;
-    let mut duties = head.actions().iter().enumerate().rev();
-    let last = duties
-        .next()
-        .map_or(spec.zero(), |(_, action)| spec.nearest(action.duty));
-    duties.fold(last, |rest, (n, action)| {
-        let this = terms.equal(index, spec.counter(n as u64));
-        terms.choose(this, spec.nearest(action.duty), rest)
-    })
+    let duties = head.actions().iter().map(|action| spec.nearest(action.duty));
+    let duties: Vec<Term> = duties.collect();
+    spec.terms.entry(index, &duties).unwrap_or(spec.zero())
 }
 
 /// What sections 8 and 9 give of one output, before it is known whether the step is trusted.

@@ -47,7 +47,7 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
         // no cause mends them: a search would take its longest and find nothing
         return without_search(problem, null);
     }
-    let candidates = candidates(&problem.base.plant, &problem.bases);
+    let candidates = candidates(&problem.base, &problem.bases);
     let basis = problem.basis(&null.model, &null.starts, &null.residual);
     let search = searcher(&problem, &candidates, &basis, &null, say);
     let singles = search.singles("each cause alone");
@@ -94,7 +94,7 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
 /// The model as given, of which it is known that no cause mends it.
 #[must_use]
 pub fn without_search(problem: Problem, null: State) -> (Problem, Attribution) {
-    let candidates = candidates(&problem.base.plant, &problem.bases);
+    let candidates = candidates(&problem.base, &problem.bases);
     let basis = problem.basis(&null.model, &null.starts, &null.residual);
     let search = searcher(&problem, &candidates, &basis, &null, &|_| ());
     let unmoved = (0..candidates.len()).map(|cause| search.fitter.unmoved(cause, 0.0));

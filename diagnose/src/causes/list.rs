@@ -8,6 +8,18 @@ pub(super) const fn knob(name: &'static str, keys: &'static [&'static str], reac
         name,
         keys,
         reach,
+        resistor: None,
+        is_lag: false,
+    }
+}
+
+/// The factor of one resistor of the load.
+pub(super) const fn resistor(name: &'static str, number: usize) -> Knob {
+    Knob {
+        name,
+        keys: &[],
+        reach: GAIN,
+        resistor: Some(number),
         is_lag: false,
     }
 }
@@ -17,6 +29,7 @@ pub(super) const fn lag(name: &'static str, keys: &'static [&'static str], reach
         name,
         keys,
         reach,
+        resistor: None,
         is_lag: true,
     }
 }

@@ -1,6 +1,7 @@
 //! The search for a set of causes: forward with several leaders, exchange, backward, and what would do as well.
 
 mod singles;
+pub(crate) mod sought;
 mod starts;
 mod weigh;
 

@@ -22,6 +22,8 @@ impl Searcher<'_> {
                 let best = self.begins(&Set::NONE, *cause, null).into_iter().next();
                 best.map_or(0.0, |(expected, _)| null.chi2 - expected)
             }
+            // nothing at the model's own values: a filter needs all of its parts
+            Search::Knee | Search::Swing => 0.0,
             _ => gained(&self.fitter.sensitivity(*cause, null), &null.residual),
         });
         let most = first_order.iter().copied().fold(0.0, f64::max);

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-use super::{Searcher, Set, TIE, gained};
+use super::{Searcher, Set, TIE, gained, sought};
 use crate::causes::Search;
 use crate::duty_steps;
 use crate::fit::{Fit, State};
@@ -75,7 +75,7 @@ impl Searcher<'_> {
     /// and input capacitors, integrated in short steps, would take most of the time of a search.
     pub(super) fn tangents(&self, cause: usize, place: usize, state: &State) -> Arc<Vec<Vec<f64>>> {
         let listed = match self.search(cause) {
-            Search::From(_) | Search::OwnOr(_) => self.fitter.starts(cause).into_iter().nth(place),
+            Search::From(_) | Search::OwnOr(_) | Search::Knee => self.fitter.starts(cause).into_iter().nth(place),
             _ => None,
         };
         let Some(start) = listed else {
@@ -124,6 +124,7 @@ impl Searcher<'_> {
                     vec![line.amplitude, line.frequency, line.phase]
                 })]
             }
+            Search::Swing => sought::swings(problem, residual, &problem.bases),
             Search::Counter => {
                 let counts = duty_steps::likely(problem, self.fitter.basis, (from, beside), COUNTS);
                 counts.into_iter().map(|counts| vec![counts.recip()]).collect()

@@ -13,6 +13,7 @@ use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::search::{Known, Searcher, TIE, gained};
 use crate::shape::structures;
+use crate::unseen::is_there;
 
 /// Causes that are fitted with free instants from where they fit without. As many as are fitted after a linear look in the search: a
 /// convention.
@@ -47,7 +48,7 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
         // no cause mends them: a search would take its longest and find nothing
         return without_search(problem, null);
     }
-    let candidates = candidates(&problem.base, &problem.bases);
+    let candidates = shown(&problem);
     let basis = problem.basis(&null.model, &null.starts, &null.residual);
     let search = searcher(&problem, &candidates, &basis, &null, say);
     let singles = search.singles("each cause alone");
@@ -94,12 +95,19 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
 /// The model as given, of which it is known that no cause mends it.
 #[must_use]
 pub fn without_search(problem: Problem, null: State) -> (Problem, Attribution) {
-    let candidates = candidates(&problem.base, &problem.bases);
+    let candidates = shown(&problem);
     let basis = problem.basis(&null.model, &null.starts, &null.residual);
     let search = searcher(&problem, &candidates, &basis, &null, &|_| ());
     let unmoved = (0..candidates.len()).map(|cause| search.fitter.unmoved(cause, 0.0));
     let attribution = completed(&search, unmoved.collect(), (None, Vec::new()));
     (problem, attribution)
+}
+
+/// The candidates, without those that change a load or a meter that no record has: they could do nothing but change the integration.
+fn shown(problem: &Problem) -> Vec<Candidate> {
+    let mut list = candidates(&problem.base, &problem.bases);
+    list.retain(|candidate| is_there(problem, candidate));
+    list
 }
 
 fn searcher<'a>(

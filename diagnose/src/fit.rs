@@ -178,7 +178,7 @@ impl Fitter<'_> {
             Search::OwnOr(list) => [vec![candidate.own.clone()], candidate.in_steps(list)].concat(),
             Search::From(list) => candidate.in_steps(list),
             // read off the residual by the search
-            Search::Line | Search::Counter | Search::Swing => Vec::new(),
+            Search::Line | Search::Counter(_) | Search::Swing => Vec::new(),
             Search::Knee => sought::knees(self.problem),
             Search::Scan(list) => list.iter().map(|n| vec![n * candidate.ranges[0][2]]).collect(),
         }

@@ -79,9 +79,9 @@ pub fn strongest_line(problem: &Problem, residual: &[f64], n: usize) -> Option<L
 /// are left.
 const SLOWEST: f64 = 1.0 / 120.0;
 const FASTEST: f64 = 0.35;
-/// A swing stands out of the median of its neighbours by this, in squares: the largest of 500 exponential numbers is nine times their median, and
-/// passes fifteen times once in seventy.
-const STANDS_OUT: f64 = 15.0;
+/// A swing stands out of the median of its neighbours by this, in squares: the largest of 200 exponential numbers is eight times
+/// their median. More only costs the look at a filter that is none.
+const STANDS_OUT: f64 = 10.0;
 /// Neighbours of a frequency are within this factor: several widths of a swing that fades within two turns.
 const NEIGHBOUR: f64 = 1.7;
 /// Two swings are apart by this share of their frequency.

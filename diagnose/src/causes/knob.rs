@@ -54,6 +54,8 @@ pub struct Knob {
     /// Keys of the plant that take its value; none for the sampling instant and the resistors of the load.
     pub keys: &'static [&'static str],
     pub(super) reach: Reach,
+    /// A step of the duty that cuts off what is no whole count: to the nearest one of half a count less.
+    pub(super) cuts_off: bool,
     /// The resistor of the load whose factor it is.
     pub(super) resistor: Option<usize>,
     /// A time constant, of which one far shorter than a period is none.
@@ -67,6 +69,7 @@ impl Knob {
             name,
             keys,
             reach: Reach::Plain(low, high, step),
+            cuts_off: false,
             resistor: None,
             is_lag: false,
         }
@@ -111,6 +114,10 @@ impl Knob {
         }
         if self.keys.is_empty() {
             model.late = value;
+        }
+        if self.cuts_off {
+            // less than half by what decimals miss of a whole count
+            model.plant.pwm.duty_offset = -(0.5 - 1e-6) * value;
         }
         for parameter in self.keys.iter().filter_map(|key| plant::parameter(key)) {
             parameter.set(&mut model.plant, value);

@@ -54,7 +54,16 @@ pub enum Search {
     /// Resistance, inductance, capacitance and its series resistance of an input filter, from the swing that stands in the residual.
     Swing,
     /// The step of a counter, from the counts that the residual suggests; whole counts are likely, and it is not smooth.
-    Counter,
+    Counter(Cut),
+}
+
+/// What a counter makes of a duty that is no whole count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cut {
+    /// The nearest count.
+    Nearest,
+    /// The count below, as a conversion to an integer does.
+    Below,
 }
 
 /// How usual a cause is on a bench, the most usual first: where data cannot tell two apart, the reader is told of the more usual one
@@ -101,7 +110,7 @@ impl Form {
     /// Whether its first parameter is varied continuously.
     #[must_use]
     pub fn is_smooth(&self) -> bool {
-        !matches!(self.search, Search::Scan(_) | Search::Counter)
+        !matches!(self.search, Search::Scan(_) | Search::Counter(_))
     }
 }
 
@@ -168,7 +177,7 @@ impl Candidate {
             // a filter without resistance swings all the same
             Search::Swing => 2,
             // its step is one of counts
-            Search::Counter => 0,
+            Search::Counter(_) => 0,
         }
     }
 
@@ -209,6 +218,8 @@ pub fn candidates(model: &Model, bases: &Bases) -> Vec<Candidate> {
     let is_known = |form: &Form| {
         let resistors = form.knobs.iter().filter(|knob| knob.resistor.is_some()).count();
         (resistors == 0 || resistors == model.resistors.len())
+            // what cuts off is an offset of half a count beside a counter, and takes the place of another
+            && (form.search != Search::Counter(Cut::Below) || model.plant.pwm.duty_offset == 0.0)
             && (is_buck || !form.knobs.iter().any(|knob| knob.keys.contains(&"capacitor.esl")))
     };
     causes

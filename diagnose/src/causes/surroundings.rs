@@ -1,8 +1,8 @@
 //! Source, modulator and load.
 
 use super::knob::{Knob, Reach};
-use super::list::{GAIN, OHMS, form, knob, lag, resistor, searched};
-use super::{Cause, Kind, Search};
+use super::list::{GAIN, OHMS, cutting, form, knob, lag, resistor, searched};
+use super::{Cause, Cut, Kind, Search};
 
 pub(super) const SOURCE_IMPEDANCE: Cause = Cause {
     id: "source_impedance",
@@ -99,11 +99,18 @@ pub(super) const DUTY_OFFSET: Cause = Cause {
 pub(super) const DUTY_QUANTISATION: Cause = Cause {
     id: "duty_quantisation",
     kind: Kind::Setting,
-    forms: &[searched(
-        "step of the duty",
-        &[knob("duty_lsb", &["pwm.duty_lsb"], Reach::Plain(0.0, 0.1, 1.0))],
-        Search::Counter,
-    )],
+    forms: &[
+        searched(
+            "step of the duty",
+            &[knob("duty_lsb", &["pwm.duty_lsb"], Reach::Plain(0.0, 0.1, 1.0))],
+            Search::Counter(Cut::Nearest),
+        ),
+        searched(
+            "step of the duty, which is cut off",
+            &[cutting("duty_lsb", &["pwm.duty_lsb"], Reach::Plain(0.0, 0.1, 1.0))],
+            Search::Counter(Cut::Below),
+        ),
+    ],
 };
 
 pub(super) const CPL_BANDWIDTH: Cause = Cause {

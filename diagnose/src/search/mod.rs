@@ -1,5 +1,6 @@
 //! The search for a set of causes: forward with several leaders, exchange, backward, and what would do as well.
 
+mod forms;
 mod singles;
 pub(crate) mod sought;
 mod starts;
@@ -184,6 +185,9 @@ impl Searcher<'_> {
             }
             leaders = larger;
         }
+        if !self.is_hopeless(&best, before) {
+            best = self.reformed(best);
+        }
         self.backward(best)
     }
 
@@ -214,7 +218,7 @@ impl Searcher<'_> {
             ..self.fitter
         };
         let fine = fitter.from(&fit.causes, &fit.values, &fit.state);
-        let is_step = |place: &(usize, usize)| self.search(place.0) == Search::Counter;
+        let is_step = |place: &(usize, usize)| matches!(self.search(place.0), Search::Counter(_));
         match fitter.places(&fit.causes).iter().position(is_step) {
             Some(place) => self.counted(fine, place),
             None => fine,

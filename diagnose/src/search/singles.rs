@@ -18,17 +18,19 @@ impl Searcher<'_> {
         let null = self.fitter.null;
         let all: Vec<usize> = (0..self.fitter.candidates.len()).collect();
         let first_order = parallel::map(&all, |cause| match self.search(*cause) {
-            Search::OwnOr(_) => {
+            Search::OwnOr(_) | Search::Knee | Search::Swing => {
                 let best = self.begins(&Set::NONE, *cause, null).into_iter().next();
                 best.map_or(0.0, |(expected, _)| null.chi2 - expected)
             }
-            // nothing at the model's own values: a filter needs all of its parts
-            Search::Knee | Search::Swing => 0.0,
             _ => gained(&self.fitter.sensitivity(*cause, null), &null.residual),
         });
         let most = first_order.iter().copied().fold(0.0, f64::max);
-        let is_followed =
-            |cause: usize| !self.begins_at_own(cause) || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED);
+        // those that are read off the records are computed in short steps, and have looked at all that is to be seen
+        let is_read_off = |cause: usize| matches!(self.search(cause), Search::Knee | Search::Swing);
+        let is_followed = |cause: usize| {
+            let may_be_left = self.begins_at_own(cause) || is_read_off(cause);
+            !may_be_left || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED)
+        };
         let looked = progress::map(self.say, stage, &all, |cause| match is_followed(*cause) {
             true => self.looked_at(*cause),
             false => self.fitter.unmoved(*cause, first_order[*cause]),

@@ -55,24 +55,25 @@ const IMPEDANCES: [f64; 2] = [0.03, 0.12];
 const DAMPED: f64 = 0.1;
 
 /// Resistance, inductance, capacitance and its series resistance of input filters that swing as the input voltage does, or where nobody has
-/// measured that, the output voltage; none where nothing swings.
+/// measured that, current and output voltage; none where nothing swings.
 pub(crate) fn swings(problem: &Problem, residual: &[f64], bases: &Bases) -> Vec<Vec<f64>> {
     let is_measured = |channel: usize| {
         let mut records = problem.records.iter().filter(|record| !record.settled);
         records.any(|record| record.measured[channel].iter().any(|value| value.is_finite()))
     };
-    let channel = if is_measured(3) { 3 } else { 0 };
+    // the output filter lets little of it through to the voltage, and the inductor's current shows it best
+    let channels = if is_measured(3) { &[3][..] } else { &[1, 0] };
     let power = bases.v * bases.i;
     let seen = bases.v_in * bases.v_in / power;
-    let of = |frequency: &f64| {
+    let of = |frequency: f64| {
         let rate = TAU * frequency;
         IMPEDANCES.map(|share| {
             let z = share * seen;
             vec![0.5 * DAMPED * z, z / rate, 1.0 / (z * rate), 0.5 * DAMPED * z]
         })
     };
-    spectrum::swings(problem, residual, channel)
+    let found = channels
         .iter()
-        .flat_map(of)
-        .collect()
+        .flat_map(|channel| spectrum::swings(problem, residual, *channel));
+    found.flat_map(of).collect()
 }

@@ -65,7 +65,7 @@ impl Searcher<'_> {
         let mut looks: Vec<_> = looks.collect();
         looks.sort_by(|a, b| a.0.total_cmp(&b.0));
         match (looks.first(), self.search(cause)) {
-            (Some((_, step)), Search::Counter) => vec![self.refined(set, cause, from, step[0].recip())],
+            (Some((_, step)), Search::Counter(_)) => vec![self.refined(set, cause, from, step[0].recip())],
             _ => looks,
         }
     }
@@ -125,8 +125,8 @@ impl Searcher<'_> {
                 })]
             }
             Search::Swing => sought::swings(problem, residual, &problem.bases),
-            Search::Counter => {
-                let counts = duty_steps::likely(problem, self.fitter.basis, (from, beside), COUNTS);
+            Search::Counter(cut) => {
+                let counts = duty_steps::likely(problem, self.fitter.basis, (from, beside), (cut, COUNTS));
                 counts.into_iter().map(|counts| vec![counts.recip()]).collect()
             }
             _ => self.fitter.starts(cause),

@@ -266,3 +266,42 @@ fn an_input_filter_that_rings_is_named() {
         is_near(&findings, "source_impedance", "resistance", filter.r, 0.05);
     }
 }
+
+#[test]
+fn a_modulator_that_cuts_off_is_named_beside_a_winding() {
+    for (seed, counts) in [(41, 64.0), (42, 47.0)] {
+        let mut d = drawn(seed);
+        (d.lab.counts, d.lab.floors) = (counts, true);
+        d.lab.dcr += 0.04 * d.v_out / d.i_l;
+        let resistors = d.resistors();
+        let findings = found(&mut d, &resistors, &ALL);
+        println!("{seed}: {}", findings.sentence);
+        assert_eq!(findings.verdict, Verdict::Explained);
+        assert_eq!(ids(&findings), ["dcr", "duty_quantisation"]);
+        is_near(&findings, "duty_quantisation", "duty_lsb", 1.0 / counts, 0.002);
+        is_near(&findings, "dcr", "dcr", d.lab.dcr, 0.03);
+    }
+}
+
+/// What the records cannot tell apart is a tie of the two, and the time is that of the edge.
+#[test]
+fn late_edges_are_named_with_their_time_or_tied_with_a_dead_time() {
+    for (seed, late) in [(51, [0.03, 0.0]), (52, [0.0, 0.03])] {
+        let mut d = drawn(seed);
+        let [on, off] = late.map(|share| share / d.lab.f_sw);
+        (d.lab.late_on, d.lab.late_off) = (on, off);
+        let resistors = d.resistors();
+        let findings = found(&mut d, &resistors, &ALL);
+        println!("{seed}: {}", findings.sentence);
+        let [cause] = &findings.causes[..] else {
+            panic!("{:?}", ids(&findings))
+        };
+        let value = cause.parameters.values().next().unwrap().value;
+        let is_tied = cause.rivals.iter().flatten().any(|id| *id == "turn_on_delay");
+        match on > 0.0 {
+            true => assert!(cause.id == "turn_on_delay" || cause.id == "dead_time" && is_tied),
+            false => assert_eq!(cause.id, "turn_off_delay"),
+        }
+        assert!((value / (on + off) - 1.0).abs() < 0.02, "{value}");
+    }
+}

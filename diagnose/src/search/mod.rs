@@ -181,7 +181,7 @@ impl Searcher<'_> {
             best = self.polished(next);
             // where the edges have to do more than they can, it is another cause as well
             if self.structure(&best) > 0.0 || self.asks_for_edges(&best.state) {
-                best = self.swapped(best);
+                best = self.reformed(self.swapped(best));
             }
             leaders = larger;
         }

@@ -25,11 +25,10 @@ impl Searcher<'_> {
             _ => gained(&self.fitter.sensitivity(*cause, null), &null.residual),
         });
         let most = first_order.iter().copied().fold(0.0, f64::max);
-        // those that are read off the records are computed in short steps, and have looked at all that is to be seen
-        let is_read_off = |cause: usize| matches!(self.search(cause), Search::Knee | Search::Swing);
-        let is_followed = |cause: usize| {
-            let may_be_left = self.begins_at_own(cause) || is_read_off(cause);
-            !may_be_left || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED)
+        // a filter or a fall that is read off the records is far from its end, and promises little there
+        let is_followed = |cause: usize| match self.search(cause) {
+            Search::Knee | Search::Swing => first_order[cause] != 0.0,
+            _ => !self.begins_at_own(cause) || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED),
         };
         let looked = progress::map(self.say, stage, &all, |cause| match is_followed(*cause) {
             true => self.looked_at(*cause),

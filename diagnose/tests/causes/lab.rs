@@ -46,6 +46,10 @@ impl Dice {
         if self.uniform() < 0.5 { -1.0 } else { 1.0 }
     }
 
+    pub fn below(&mut self, count: usize) -> usize {
+        ((self.uniform() * count as f64) as usize).min(count - 1)
+    }
+
     pub fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform() - 0.5).sum()
     }
@@ -200,6 +204,12 @@ impl Lab {
         }
     }
 
+    /// About the current at which the switch turns off, A.
+    fn peak(&self, x: &State, duty: f64) -> f64 {
+        let across = if self.boost { self.v_in } else { self.v_in - x[1] };
+        (x[0] + 0.5 * duty * across / (self.l * self.f_sw)).max(1e-3)
+    }
+
     /// A table as a logger writes it, of the columns that are asked for beside `t` and `duty`.
     pub fn table(&self, columns: &[&str], meters: &Meters, dice: &mut Dice) -> String {
         let d = self.duty_at(0);
@@ -224,12 +234,7 @@ impl Lab {
                 true => (said * self.counts + if self.floors { 1e-9 } else { 0.5 }).floor() / self.counts,
                 false => said,
             };
-            let later = self.late_off
-                + if self.node_charge > 0.0 {
-                    self.node_charge / x[0].max(1e-3)
-                } else {
-                    0.0
-                };
+            let later = self.late_off + self.node_charge / self.peak(&x, duty);
             let rise = 0.5 * (1.0 - duty) + self.late_on * self.f_sw;
             let fall = 0.5 * (1.0 + duty) + (later * self.f_sw).min(0.2);
             let mut marks = vec![0.0, rise, fall, 0.5, 1.0];

@@ -3,34 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod lab;
-
-use std::time::Instant;
+mod survey;
 
 use diagnose::diagnosis::diagnose;
-use diagnose::findings::{Findings, Named, Verdict};
+use diagnose::findings::{Findings, Verdict};
 use lab::{Drawn, InputFilter, Knee, Resistors, drawn};
-
-fn said(causes: &[Named]) -> String {
-    let one = |cause: &Named| {
-        let values = cause
-            .parameters
-            .iter()
-            .map(|(name, p)| format!("{name} {:.4e} [{:.3e}, {:.3e}] {}", p.value, p.low, p.high, p.unit));
-        let rivals: Vec<String> = cause
-            .rivals
-            .iter()
-            .map(|r| format!("{r:?}").chars().take(150).collect())
-            .collect();
-        format!(
-            "{} ({}; {}; {:.0}) rivals {rivals:?}",
-            cause.id,
-            cause.words,
-            values.collect::<Vec<_>>().join(", "),
-            cause.evidence.delta_chi2
-        )
-    };
-    causes.iter().map(one).collect::<Vec<_>>().join("\n      ")
-}
 
 const ALL: [&str; 5] = ["v_out", "i_l", "i_out", "v_in", "r_load"];
 const WITHOUT_I_OUT: [&str; 4] = ["v_out", "i_l", "v_in", "r_load"];
@@ -39,141 +16,6 @@ fn found(drawn: &mut Drawn, resistors: &Resistors, columns: &[&str]) -> Findings
     let labs = drawn.labs(resistors);
     let [duty, load, held] = drawn.records(&labs, columns);
     diagnose(&drawn.model, vec![duty, load], &[held], &|_| ()).findings
-}
-
-fn cpu() -> f64 {
-    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let fields: Vec<&str> = text.rsplit(')').next().unwrap_or("").split_whitespace().collect();
-    fields.get(11..13).map_or(0.0, |t| {
-        t.iter().filter_map(|t| t.parse::<f64>().ok()).sum::<f64>() / 100.0
-    })
-}
-
-/// Figures for a page: `CASES=kind SEED=n COUNT=n cargo test ... -- --ignored --nocapture survey`.
-#[test]
-#[ignore = "prints figures"]
-fn survey() {
-    let get = |name: &str, other: &str| std::env::var(name).unwrap_or(other.to_owned());
-    let (kind, count) = (get("CASES", "healthy"), get("COUNT", "12").parse::<u64>().unwrap());
-    let seed = get("SEED", "1").parse::<u64>().unwrap();
-    for n in 0..count {
-        let mut d = drawn(seed.wrapping_add(1_000_003 * n));
-        let mut resistors = d.resistors();
-        let mut columns: &[&str] = if n % 2 == 0 { &ALL } else { &WITHOUT_I_OUT };
-        let r = d.v_out / d.i_l;
-        let t = 1.0 / d.lab.f_sw;
-        let truth = match kind.as_str() {
-            "healthy" => "nothing".to_owned(),
-            "resistors" => {
-                let each = n % 3 == 1;
-                let one = d.dice.sign() * d.dice.between(0.04, 0.1);
-                resistors.off = std::array::from_fn(|_| {
-                    if each {
-                        d.dice.sign() * d.dice.between(0.03, 0.1)
-                    } else {
-                        one
-                    }
-                });
-                let more = r * d.dice.between(0.02, 0.06);
-                let what = match n / 3 % 3 {
-                    0 => {
-                        d.lab.dcr += more;
-                        "dcr"
-                    }
-                    1 => {
-                        d.lab.r_on += more;
-                        "r_on"
-                    }
-                    _ => "none",
-                };
-                format!(
-                    "resistors {:.3?} in g, {what} {:.4e} -> dcr {:.4e} r_on {:.4e}",
-                    resistors.off, more, d.lab.dcr, d.lab.r_on
-                )
-            }
-            "edges" => {
-                let a = t * d.dice.between(0.01, 0.05);
-                let b = t * d.dice.between(0.01, 0.05);
-                match n % 4 {
-                    0 => d.lab.late_on = a,
-                    1 => d.lab.late_off = a,
-                    2 => (d.lab.late_on, d.lab.late_off) = (a, b),
-                    _ => d.lab.node_charge = a * d.i_l,
-                }
-                format!(
-                    "on {:.3e} off {:.3e} charge {:.3e} (at i_l {:.3e} s)",
-                    d.lab.late_on,
-                    d.lab.late_off,
-                    d.lab.node_charge,
-                    d.lab.node_charge / d.i_l
-                )
-            }
-            "filter" => {
-                // swings between a fifth and a thirtieth of the switching frequency
-                let i_in = d.v_out * d.v_out * d.g / d.lab.v_in;
-                let r_in = d.lab.v_in / i_in;
-                let z = r_in * d.dice.around(0.03, 0.12);
-                let w = std::f64::consts::TAU * d.lab.f_sw / d.dice.around(5.0, 30.0);
-                let f = InputFilter {
-                    r: r_in * d.dice.around(0.006, 0.03),
-                    l: z / w,
-                    c: 1.0 / (z * w),
-                    esr: r_in * d.dice.around(0.0005, 0.01),
-                };
-                d.lab.filter = Some(f);
-                if n % 3 == 2 {
-                    columns = &["v_out", "i_l", "r_load"];
-                }
-                format!("{f:?} f/f_sw {:.3}", w / std::f64::consts::TAU / d.lab.f_sw)
-            }
-            "knee" => {
-                let k = Knee {
-                    at: d.i_l * d.dice.between(0.95, 1.5),
-                    width: d.dice.between(0.1, 0.3),
-                    left: d.dice.between(0.15, 0.3),
-                };
-                d.lab.knee = Some(k);
-                format!("{k:.3?} i_l {:.3}", d.i_l)
-            }
-            "grid" => {
-                d.lab.counts = match n % 3 {
-                    0 => [32.0, 64.0, 128.0, 256.0][d.dice.between(0.0, 4.0) as usize],
-                    1 => d.dice.around(24.0, 220.0).round(),
-                    _ => d.dice.around(24.0, 220.0),
-                };
-                d.lab.floors = n % 4 == 3;
-                let more = r * d.dice.between(0.02, 0.06);
-                if n % 2 == 1 {
-                    d.lab.dcr += more;
-                }
-                format!(
-                    "lsb {:.5} counts {:.3} floors {} dcr {:.4e}",
-                    1.0 / d.lab.counts,
-                    d.lab.counts,
-                    d.lab.floors,
-                    d.lab.dcr
-                )
-            }
-            other => panic!("no {other}"),
-        };
-        let (begin, start) = (cpu(), Instant::now());
-        let f = found(&mut d, &resistors, columns);
-        println!(
-            "{kind} {n} {}{} v_in {:.1} f_sw {:.0} d {:.2} i_l {:.2}: {truth}\n   {:?} cpu {:.1} s ({:.1} s)\n      {}\n      partial {}\n   {}",
-            if d.lab.boost { "boost" } else { "buck" },
-            if columns.contains(&"i_out") { " i_out" } else { "" },
-            d.lab.v_in,
-            d.lab.f_sw,
-            d.duty,
-            d.i_l,
-            f.verdict,
-            cpu() - begin,
-            start.elapsed().as_secs_f64(),
-            said(&f.causes),
-            said(&f.partial),
-            f.sentence
-        );
-    }
 }
 
 fn ids(findings: &Findings) -> Vec<&'static str> {
@@ -192,6 +34,11 @@ fn is_near(findings: &Findings, id: &str, parameter: &str, truth: f64, share: f6
     );
 }
 
+/// Whether causes are named and have no rivals; a channel that a held-out record leaves over the noise may be set aside.
+fn is_answered(findings: &Findings) -> bool {
+    matches!(findings.verdict, Verdict::Explained | Verdict::MostlyExplained)
+}
+
 #[test]
 fn resistors_that_are_each_off_by_something_else_are_named_beside_a_winding() {
     for seed in [11, 12] {
@@ -201,7 +48,7 @@ fn resistors_that_are_each_off_by_something_else_are_named_beside_a_winding() {
         d.lab.dcr += 0.04 * d.v_out / d.i_l;
         let findings = found(&mut d, &resistors, &WITHOUT_I_OUT);
         println!("{seed}: {}\n{:#?}", findings.sentence, findings.noise.repairs);
-        assert_eq!(findings.verdict, Verdict::Explained);
+        assert!(is_answered(&findings), "{:?}", findings.verdict);
         assert_eq!(ids(&findings), ["dcr", "load_gain"]);
         is_near(&findings, "dcr", "dcr", d.lab.dcr, 0.02);
         // printed, the largest conductance first
@@ -230,7 +77,7 @@ fn a_core_that_saturates_at_once_is_named() {
         let resistors = d.resistors();
         let findings = found(&mut d, &resistors, &ALL);
         println!("{seed}: {}", findings.sentence);
-        assert_eq!(findings.verdict, Verdict::Explained);
+        assert!(is_answered(&findings), "{:?}", findings.verdict);
         assert_eq!(ids(&findings), ["l_saturation"]);
         // half of what is lost is lost in the middle of the fall
         is_near(
@@ -259,7 +106,7 @@ fn an_input_filter_that_rings_is_named() {
         let resistors = d.resistors();
         let findings = found(&mut d, &resistors, &ALL);
         println!("{seed}: {}", findings.sentence);
-        assert_eq!(findings.verdict, Verdict::Explained);
+        assert!(is_answered(&findings), "{:?}", findings.verdict);
         assert_eq!(ids(&findings), ["source_impedance"]);
         is_near(&findings, "source_impedance", "inductance", filter.l, 0.05);
         is_near(&findings, "source_impedance", "c_in", filter.c, 0.05);
@@ -276,7 +123,7 @@ fn a_modulator_that_cuts_off_is_named_beside_a_winding() {
         let resistors = d.resistors();
         let findings = found(&mut d, &resistors, &ALL);
         println!("{seed}: {}", findings.sentence);
-        assert_eq!(findings.verdict, Verdict::Explained);
+        assert!(is_answered(&findings), "{:?}", findings.verdict);
         assert_eq!(ids(&findings), ["dcr", "duty_quantisation"]);
         is_near(&findings, "duty_quantisation", "duty_lsb", 1.0 / counts, 0.002);
         is_near(&findings, "dcr", "dcr", d.lab.dcr, 0.03);

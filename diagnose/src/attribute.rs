@@ -14,6 +14,7 @@ use crate::progress::{Listener, Progress};
 use crate::search::{Known, Searcher, TIE, gained};
 use crate::shape::structures;
 use crate::small;
+use crate::unseen::is_there;
 
 /// Causes that are fitted with free instants from where they fit without. As many as are fitted after a linear look in the search: a
 /// convention.
@@ -103,10 +104,11 @@ pub fn without_search(problem: Problem, null: State) -> (Problem, Attribution) {
     (problem, attribution)
 }
 
-/// The causes that may be: those that change nothing of what is certain.
+/// The causes that may be: those that change nothing of what is certain, and no load or meter that no record has. Those could do nothing but
+/// change the integration.
 fn sought(problem: &Problem) -> Vec<Candidate> {
-    let mut list = candidates(&problem.base.plant, &problem.bases);
-    list.retain(|candidate| !candidate.changes(&problem.base.certain));
+    let mut list = candidates(&problem.base, &problem.bases);
+    list.retain(|candidate| is_there(problem, candidate) && !candidate.changes(&problem.base.certain));
     list
 }
 

@@ -27,6 +27,7 @@ use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
+use crate::resistors;
 use crate::unseen;
 use crate::whiteness;
 use crate::words::{nearest, other_carrier as other_carrier_said, sentence, shifted, si};
@@ -78,7 +79,8 @@ pub fn diagnose_knowing(
     say: Listener<'_>,
 ) -> Diagnosis {
     let (model, standing) = &empirical::without_standing(model);
-    let base = Model::new(model).knowing(certain);
+    let mut base = Model::new(model).knowing(certain);
+    base.resistors = resistors::printed(&train);
     let (judges, unused) = without_captures(heldout);
     let heldout = &judges[..];
     // a second look begins with the records as they were read
@@ -441,6 +443,7 @@ fn notes(found: &Examined, pair: Option<&Pair>) -> Vec<String> {
     }));
     notes.extend(pair.into_iter().flat_map(|pair| pair.remarks.clone()));
     notes.extend(edges(found));
+    notes.extend(resistors::note(attribution).filter(|_| found.verdict != Verdict::Unexplained));
     // of what was found: where the model as given is far off, so are the instants of load steps that fit it best
     if found.verdict != Verdict::Unexplained {
         notes.extend(beside::notes(problem, attribution, &found.profiles));

@@ -14,6 +14,7 @@ use measured::{DutyIs, Sampled};
 use plant::{Load, Parameters, Plant, Signals};
 
 use crate::record::{CHANNELS, Record, Segment};
+use crate::resistors::{self, Resistor};
 
 /// Duties before a segment that the plant is given at least: more than it can delay. A rate looks back farther.
 // eight that wait and the one in force
@@ -49,6 +50,8 @@ pub struct Model {
     pub late: f64,
     /// Keys of the plant file whose numbers are certain: no cause changes them.
     pub certain: Arc<[String]>,
+    /// The resistors of the load, where the records have several.
+    pub resistors: Vec<Resistor>,
 }
 
 impl Model {
@@ -58,6 +61,7 @@ impl Model {
         Model {
             plant: plant.clone(),
             late: 0.0,
+            resistors: Vec::new(),
             certain: Arc::default(),
         }
     }
@@ -131,7 +135,7 @@ pub fn simulate(model: &Model, record: &Record, begin: &Begin<'_>) -> Vec<[f64; 
     p.pwm.sampling_phase = phase;
     let driver = Driver {
         record,
-        load: shifted_load(record, begin.levels),
+        load: shifted_load(record, begin.levels, &model.resistors),
         whole: whole as isize,
         phase,
         steps: record
@@ -238,12 +242,16 @@ impl Driver<'_> {
     }
 }
 
-/// The load of a record whose free levels are off by so many standard deviations.
-fn shifted_load<'a>(record: &'a Record, levels: &[f64]) -> Cow<'a, [Load]> {
-    if levels.iter().all(|by| *by == 0.0) {
+/// The load of a record whose free levels are off by so many standard deviations, and whose resistors are other than printed.
+fn shifted_load<'a>(record: &'a Record, levels: &[f64], resistors: &[Resistor]) -> Cow<'a, [Load]> {
+    let are_off = resistors::are_off(resistors);
+    if levels.iter().all(|by| *by == 0.0) && !are_off {
         return Cow::Borrowed(&record.load);
     }
     let mut load = record.load.clone();
+    if are_off {
+        resistors::apply(resistors, &mut load);
+    }
     for (level, by) in record.free_levels.iter().zip(levels) {
         level.shift(&mut load, *by);
     }

@@ -6,6 +6,7 @@ use std::ops::Range;
 use plant::{Parameters, Topology};
 
 use crate::basis::Basis;
+use crate::causes::Cut;
 use crate::fit::State;
 use crate::ideal;
 use crate::parallel;
@@ -34,7 +35,7 @@ pub(crate) fn likely(
     problem: &Problem,
     basis: &Basis,
     (from, beside): (&State, &[Vec<f64>]),
-    count: usize,
+    (cut, count): (Cut, usize),
 ) -> Vec<f64> {
     let (plant, residual) = (&from.model.plant, &from.residual);
     let numbers: Vec<f64> = (0..=((MOST - FEWEST) / APART) as usize)
@@ -62,7 +63,7 @@ pub(crate) fn likely(
         (along, products.collect::<Vec<_>>())
     });
     let gains = parallel::map(&numbers, |counts| {
-        let moved = |duty: f64| rounded(duty, *counts) - duty;
+        let moved = |duty: f64| rounded(duty, *counts, cut) - duty;
         let (along, length) = match &parts {
             Some((along, products)) => {
                 let by: Vec<f64> = levels.iter().map(|level| moved(*level)).collect();
@@ -79,7 +80,7 @@ pub(crate) fn likely(
         // by how much chi-square falls if that share of the response is taken away
         2.0 * share * along - share * share * length
     });
-    let mut pieces: Vec<(f64, Range<usize>)> = pieces(problem, &numbers)
+    let mut pieces: Vec<(f64, Range<usize>)> = pieces(problem, &numbers, cut)
         .into_iter()
         .map(|piece| (gains[piece.clone()].iter().copied().fold(0.0, f64::max), piece))
         .collect();
@@ -136,18 +137,30 @@ fn levels(problem: &Problem) -> Vec<f64> {
     duties
 }
 
+/// A share of a count by which a duty in decimals may miss a whole one.
+const WHOLE: f64 = 1e-6;
+
 /// A duty as a counter rounds it.
-fn rounded(duty: f64, counts: f64) -> f64 {
-    (libm::floor(duty * counts + 0.5) / counts).min(1.0)
+fn rounded(duty: f64, counts: f64, cut: Cut) -> f64 {
+    (counted(duty, counts, cut) / counts).min(1.0)
+}
+
+/// Counts of a duty; as the plant rounds, half up.
+fn counted(duty: f64, counts: f64, cut: Cut) -> f64 {
+    let up = match cut {
+        Cut::Nearest => 0.5,
+        // a duty of whole counts, written in decimals, is those
+        Cut::Below => WHOLE,
+    };
+    libm::floor(duty * counts + up)
 }
 
 /// Stretches of numbers that round every duty to the same count: what they make of a record changes smoothly within.
-fn pieces(problem: &Problem, numbers: &[f64]) -> Vec<Range<usize>> {
+fn pieces(problem: &Problem, numbers: &[f64], cut: Cut) -> Vec<Range<usize>> {
     let mut duties: Vec<f64> = problem.records.iter().flat_map(|r| r.duty.iter().copied()).collect();
     duties.sort_by(f64::total_cmp);
     duties.dedup();
-    // as the plant rounds: half up
-    let count = |duty: f64, counts: f64| libm::floor(duty * counts + 0.5);
+    let count = |duty: f64, counts: f64| counted(duty, counts, cut);
     let mut list = Vec::new();
     let mut start = 0;
     for n in 1..=numbers.len() {
@@ -226,7 +239,7 @@ mod tests {
     use measured::{ColumnMap, Sheet};
     use plant::Parameters;
 
-    use super::{dot, levels, likely, response, rounded};
+    use super::{Cut, dot, levels, likely, response, rounded};
     use crate::drive::Model;
     use crate::fit::State;
     use crate::problem::Problem;
@@ -255,11 +268,11 @@ mod tests {
         let problem = problem(&model);
         let levels = levels(&problem);
         assert_eq!(levels, [0.437, 0.5, 0.561]);
-        let whole = response(&problem, &model, &|duty| rounded(duty, 33.3) - duty);
+        let whole = response(&problem, &model, &|duty| rounded(duty, 33.3, Cut::Nearest) - duty);
         let mut sum = vec![0.0; whole.len()];
         for level in levels {
             let unit = response(&problem, &model, &|duty| f64::from(u8::from(duty == level)));
-            let by = rounded(level, 33.3) - level;
+            let by = rounded(level, 33.3, Cut::Nearest) - level;
             sum.iter_mut().zip(unit).for_each(|(sum, unit)| *sum += by * unit);
         }
         let most = whole.iter().fold(0.0f64, |most, value| most.max(value.abs()));
@@ -272,7 +285,7 @@ mod tests {
         let problem = problem(&model);
         let mut real = model.clone();
         real.converter.capacitance *= 0.4;
-        let residual = response(&problem, &real, &|duty| rounded(duty, 37.0) - duty);
+        let residual = response(&problem, &real, &|duty| rounded(duty, 37.0, Cut::Nearest) - duty);
         let counts_of = |plant: &Parameters| {
             let from = State {
                 model: Model::new(plant),
@@ -281,7 +294,7 @@ mod tests {
                 residual: residual.clone(),
             };
             let basis = problem.basis(&from.model, &from.starts, &from.residual);
-            likely(&problem, &basis, (&from, &[]), 1)
+            likely(&problem, &basis, (&from, &[]), (Cut::Nearest, 1))
         };
         let found = counts_of(&real);
         assert!(found.iter().any(|counts| (counts - 37.0).abs() < 0.3), "{found:?}");

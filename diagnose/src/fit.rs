@@ -14,6 +14,7 @@ use crate::causes::{Candidate, Search};
 use crate::drive::Model;
 use crate::normal::Normal;
 use crate::problem::{Problem, Starts, axpy, dot, nudged};
+use crate::search::sought;
 
 /// A step that gains less than this ends the settling of initial states: a five-hundredth of what
 /// decides a tie (9).
@@ -177,7 +178,8 @@ impl Fitter<'_> {
             Search::OwnOr(list) => [vec![candidate.own.clone()], candidate.in_steps(list)].concat(),
             Search::From(list) => candidate.in_steps(list),
             // read off the residual by the search
-            Search::Line | Search::Counter => Vec::new(),
+            Search::Line | Search::Counter(_) | Search::Swing => Vec::new(),
+            Search::Knee => sought::knees(self.problem),
             Search::Scan(list) => list.iter().map(|n| vec![n * candidate.ranges[0][2]]).collect(),
         }
     }

@@ -57,6 +57,7 @@ pub mod profile;
 pub mod progress;
 mod quantised;
 pub mod record;
+pub mod resistors;
 pub mod results;
 pub mod retrain;
 pub mod rivals;

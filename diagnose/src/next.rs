@@ -89,7 +89,7 @@ pub fn advice(findings: &Findings) -> Option<String> {
     let mut ids: Vec<&str> = tied.iter().map(|cause| cause.id).chain(rivals).collect();
     ids.sort_unstable();
     ids.dedup();
-    let has_v_in = findings.compared.channels.iter().any(|channel| *channel == "v_in");
+    let has_v_in = findings.compared.channels.contains(&"v_in");
     let none = match findings.next_experiments.is_empty() {
         true => "None of the experiments that are tried would break the tie.",
         false => "",

@@ -87,7 +87,7 @@ pub fn profiles(problem: &Problem, attribution: &Attribution, say: Listener<'_>)
             let fit = fitter.holding(&best.causes, &values, &best.state, Some(*number));
             ((fit.state.chi2 - best.state.chi2) / attribution.inflation).max(0.0)
         };
-        if candidate.form.search == Search::Counter {
+        if matches!(candidate.form.search, Search::Counter(_)) {
             profile.interval = [-1.0, 1.0].map(|side| alike(value, side, &at_value));
         }
         // without a slope there is no scale at which to try other values

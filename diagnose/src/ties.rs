@@ -75,7 +75,9 @@ pub fn in_part(problem: &Problem, attribution: &Attribution, say: Listener<'_>) 
         let variance = best.covariance[number][number].max(0.0);
         let is_needed = off * off > NEEDED * TIE * attribution.inflation * variance;
         let tie = tie(off * off / variance);
-        if candidate.own.len() < 2 || !candidate.form.begins_at_own() || !is_needed || variance == 0.0 {
+        // whatever else the load draws is a part of every resistor's error
+        let is_resistor = candidate.form.knobs[place.1].is_resistor();
+        if candidate.own.len() < 2 || !candidate.form.begins_at_own() || !is_needed || variance == 0.0 || is_resistor {
             continue;
         }
         let mut left = best.state.residual.clone();

@@ -56,7 +56,7 @@ const SENSORS: [&str; CHANNELS] = ["sensors.v_out.", "sensors.i_l.", "sensors.i_
 
 /// Whether the records have the load or the channel that a cause changes: an error of a load that nobody connected, or of a meter that
 /// nobody read, is not hidden in them.
-fn is_there(problem: &Problem, candidate: &Candidate) -> bool {
+pub(crate) fn is_there(problem: &Problem, candidate: &Candidate) -> bool {
     let loads = || problem.records.iter().flat_map(|record| &record.load);
     let is_of_something = |key: &&str| match *key {
         "load.cpl_time_constant" | "load.v_fold" => loads().any(|load| load.power != 0.0),

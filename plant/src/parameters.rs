@@ -226,6 +226,8 @@ table! {
         saturation: f64,
         /// Current at which half of that share is lost, A.
         i_sat: f64,
+        /// How suddenly it is lost, 1 and more.
+        steepness: f64,
         /// Conductance across the inductance that stands for the core loss, S.
         core_conductance: f64,
     }

@@ -26,6 +26,12 @@ fn rates(p: &Parameters, mut ask: impl FnMut(&'static str, f64, f64)) {
         + p.switch.r_ds_on.max(p.switch.r_ds_on_low).max(p.switch.r_d)
         + p.source.resistance;
     ask("converter.inductance", 1.0 / (l * c).sqrt(), FILTER_STEP);
+    if p.inductor.saturation > 0.0 && p.inductor.steepness > 1.0 {
+        // a step each time the current passes the width of the fall, at the slope that it has in the middle: longer ones jump over it
+        let middle = p.converter.inductance * (1.0 - 0.5 * p.inductor.saturation);
+        let rate = p.converter.v_in / middle * p.inductor.steepness / p.inductor.i_sat;
+        ask("inductor.i_sat", rate, 1.0);
+    }
     let mut ask = |key: &'static str, rate: f64| ask(key, rate, OTHER_STEP);
     ask("converter.inductance", (r + p.capacitor.esr) / l);
     // those of the sensors ask for nothing: `crate::lag`

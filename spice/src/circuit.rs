@@ -163,7 +163,12 @@ fn inductor(n: &mut String, p: &Parameters, i_l: f64) {
     };
     if i.saturation > 0.0 {
         let x = format!("(V(fl)/{})", i.i_sat);
-        let value = format!("{l:e}*(1-{}*{x}*{x}/(1+{x}*{x}))", i.saturation);
+        let (whole, rest) = (i.steepness.floor(), i.steepness.fract());
+        let y = match i.steepness == 1.0 {
+            true => format!("{x}*{x}"),
+            false => format!("(({x}*{x})^{whole}*(1+{rest}*({x}*{x}-1)))"),
+        };
+        let value = format!("{l:e}*(1-{}*{y}/(1+{y}))", i.saturation);
         let _ = writeln!(
             n,
             // an integrator whose voltage is the current: the inductance may then follow it as an expression

@@ -118,15 +118,27 @@ pub(super) const C_WRONG: Cause = Cause {
 pub(super) const L_SATURATION: Cause = Cause {
     id: "l_saturation",
     kind: Kind::Part,
-    forms: &[searched(
-        "inductance that falls with current",
-        &[
-            // the bound is the plant's; it bends from below the usual current to far above, where it is a smaller L
-            knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.95, 0.1)),
-            knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
-        ],
-        Search::From(&[&[0.3, 6.0], &[0.3, 12.0], &[0.3, 25.0], &[4.0, 12.0]]),
-    )],
+    forms: &[
+        searched(
+            "inductance that falls with current",
+            &[
+                // the bound is the plant's; it bends from below the usual current to far above, where it is a smaller L
+                knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.95, 0.1)),
+                knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
+            ],
+            Search::From(&[&[0.3, 6.0], &[0.3, 12.0], &[0.3, 25.0], &[4.0, 12.0]]),
+        ),
+        searched(
+            "inductance that falls steeply with current",
+            &[
+                knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.95, 0.1)),
+                knob("i_sat", &["inductor.i_sat"], Reach::Current(0.3, 8.0, 0.1)),
+                // the plant's bounds: from a powder core to one that falls within a tenth of i_sat
+                knob("steepness", &["inductor.steepness"], Reach::Plain(1.0, 32.0, 0.5)),
+            ],
+            Search::Knee,
+        ),
+    ],
 };
 
 pub(super) const C_DERATING: Cause = Cause {

@@ -51,9 +51,13 @@ const NO_LAG: f64 = 0.01;
 pub struct Knob {
     /// Name in the results.
     pub name: &'static str,
-    /// Keys of the plant that take its value; none for the sampling instant.
+    /// Keys of the plant that take its value; none for the sampling instant and the resistors of the load.
     pub keys: &'static [&'static str],
     pub(super) reach: Reach,
+    /// A step of the duty that cuts off what is no whole count: to the nearest one of half a count less.
+    pub(super) cuts_off: bool,
+    /// The resistor of the load whose factor it is.
+    pub(super) resistor: Option<usize>,
     /// A time constant, of which one far shorter than a period is none.
     pub(super) is_lag: bool,
 }
@@ -65,8 +69,16 @@ impl Knob {
             name,
             keys,
             reach: Reach::Plain(low, high, step),
+            cuts_off: false,
+            resistor: None,
             is_lag: false,
         }
+    }
+
+    /// Whether it is what one resistor of the load is off by.
+    #[must_use]
+    pub fn is_resistor(&self) -> bool {
+        self.resistor.is_some()
     }
 
     /// SI unit.
@@ -74,6 +86,7 @@ impl Knob {
     pub fn unit(&self) -> &'static str {
         match self.keys.first().and_then(|key| plant::parameter(key)) {
             Some(parameter) => parameter.unit,
+            None if self.resistor.is_some() => "1",
             None => "s",
         }
     }
@@ -81,6 +94,9 @@ impl Knob {
     /// Value in a model.
     #[must_use]
     pub fn get(&self, model: &Model) -> f64 {
+        if let Some(number) = self.resistor {
+            return model.resistors.get(number).map_or(1.0, |one| one.factor);
+        }
         match self.keys.first().and_then(|key| plant::parameter(key)) {
             Some(parameter) => parameter.get(&model.plant),
             None => model.late,
@@ -90,8 +106,18 @@ impl Knob {
     /// Gives a model the value.
     pub fn set(&self, model: &mut Model, value: f64) {
         let value = self.snapped(model, value);
+        if let Some(number) = self.resistor {
+            if let Some(one) = model.resistors.get_mut(number) {
+                one.factor = value;
+            }
+            return;
+        }
         if self.keys.is_empty() {
             model.late = value;
+        }
+        if self.cuts_off {
+            // less than half by what decimals miss of a whole count
+            model.plant.pwm.duty_offset = -(0.5 - 1e-6) * value;
         }
         for parameter in self.keys.iter().filter_map(|key| plant::parameter(key)) {
             parameter.set(&mut model.plant, value);

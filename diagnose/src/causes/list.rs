@@ -8,6 +8,28 @@ pub(super) const fn knob(name: &'static str, keys: &'static [&'static str], reac
         name,
         keys,
         reach,
+        cuts_off: false,
+        resistor: None,
+        is_lag: false,
+    }
+}
+
+/// A step of the duty that cuts off.
+pub(super) const fn cutting(name: &'static str, keys: &'static [&'static str], reach: Reach) -> Knob {
+    Knob {
+        cuts_off: true,
+        ..knob(name, keys, reach)
+    }
+}
+
+/// The factor of one resistor of the load.
+pub(super) const fn resistor(name: &'static str, number: usize) -> Knob {
+    Knob {
+        name,
+        keys: &[],
+        reach: GAIN,
+        cuts_off: false,
+        resistor: Some(number),
         is_lag: false,
     }
 }
@@ -17,6 +39,8 @@ pub(super) const fn lag(name: &'static str, keys: &'static [&'static str], reach
         name,
         keys,
         reach,
+        cuts_off: false,
+        resistor: None,
         is_lag: true,
     }
 }

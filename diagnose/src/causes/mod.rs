@@ -9,7 +9,7 @@ mod knob;
 mod list;
 mod surroundings;
 
-use plant::{Parameters, Topology};
+use plant::Topology;
 
 use crate::drive::Model;
 use knob::Reach;
@@ -49,8 +49,21 @@ pub enum Search {
     Scan(&'static [f64]),
     /// Amplitude, frequency and phase of a line, from the strongest that stands in the residual.
     Line,
+    /// Share lost, current and steepness of a fall of the inductance, between the peaks of the current that the records have.
+    Knee,
+    /// Resistance, inductance, capacitance and its series resistance of an input filter, from the swing that stands in the residual.
+    Swing,
     /// The step of a counter, from the counts that the residual suggests; whole counts are likely, and it is not smooth.
-    Counter,
+    Counter(Cut),
+}
+
+/// What a counter makes of a duty that is no whole count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cut {
+    /// The nearest count.
+    Nearest,
+    /// The count below, as a conversion to an integer does.
+    Below,
 }
 
 /// How usual a cause is on a bench, the most usual first: where data cannot tell two apart, the reader is told of the more usual one
@@ -97,7 +110,7 @@ impl Form {
     /// Whether its first parameter is varied continuously.
     #[must_use]
     pub fn is_smooth(&self) -> bool {
-        !matches!(self.search, Search::Scan(_) | Search::Counter)
+        !matches!(self.search, Search::Scan(_) | Search::Counter(_))
     }
 }
 
@@ -167,9 +180,11 @@ impl Candidate {
     pub fn sizes(&self) -> usize {
         match self.form.search {
             Search::Own | Search::OwnOr(_) => self.own.len(),
-            Search::From(_) | Search::Scan(_) | Search::Line => 1,
+            Search::From(_) | Search::Scan(_) | Search::Line | Search::Knee => 1,
+            // a filter without resistance swings all the same
+            Search::Swing => 2,
             // its step is one of counts
-            Search::Counter => 0,
+            Search::Counter(_) => 0,
         }
     }
 
@@ -189,12 +204,11 @@ impl Candidate {
     }
 }
 
-/// The candidates for a converter.
+/// The candidates for a converter and the resistors of its load.
 #[must_use]
-pub fn candidates(parameters: &Parameters, bases: &Bases) -> Vec<Candidate> {
-    let model = Model::new(parameters);
+pub fn candidates(model: &Model, bases: &Bases) -> Vec<Candidate> {
     let candidate = |number: usize, cause: &'static Cause, form: &'static Form| {
-        let own: Vec<f64> = form.knobs.iter().map(|knob| knob.get(&model)).collect();
+        let own: Vec<f64> = form.knobs.iter().map(|knob| knob.get(model)).collect();
         let ranges = form.knobs.iter().zip(&own);
         let ranges = ranges.map(|(knob, own)| knob.range(*own, bases)).collect();
         Candidate {
@@ -207,9 +221,13 @@ pub fn candidates(parameters: &Parameters, bases: &Bases) -> Vec<Candidate> {
     };
     let causes = CAUSES.iter().enumerate();
     // the plant has no such inductance where the leg interrupts the capacitor's current at every edge
+    let is_buck = model.plant.converter.topology == Topology::Buck;
     let is_known = |form: &Form| {
-        parameters.converter.topology == Topology::Buck
-            || !form.knobs.iter().any(|knob| knob.keys.contains(&"capacitor.esl"))
+        let resistors = form.knobs.iter().filter(|knob| knob.resistor.is_some()).count();
+        (resistors == 0 || resistors == model.resistors.len())
+            // what cuts off is an offset of half a count beside a counter, and takes the place of another
+            && (form.search != Search::Counter(Cut::Below) || model.plant.pwm.duty_offset == 0.0)
+            && (is_buck || !form.knobs.iter().any(|knob| knob.keys.contains(&"capacitor.esl")))
     };
     causes
         .flat_map(|(number, cause)| cause.forms.iter().map(move |form| (number, cause, form)))

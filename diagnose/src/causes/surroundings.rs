@@ -1,8 +1,8 @@
 //! Source, modulator and load.
 
-use super::knob::Reach;
-use super::list::{GAIN, OHMS, form, knob, lag, searched};
-use super::{Cause, Kind, Search};
+use super::knob::{Knob, Reach};
+use super::list::{GAIN, OHMS, cutting, form, knob, lag, resistor, searched};
+use super::{Cause, Cut, Kind, Search};
 
 pub(super) const SOURCE_IMPEDANCE: Cause = Cause {
     id: "source_impedance",
@@ -24,6 +24,21 @@ pub(super) const SOURCE_IMPEDANCE: Cause = Cause {
                 knob("c_in", &["source.c_in"], Reach::Capacitance(10.0, 1e6, 20.0)),
             ],
             Search::From(&[&[4.0, 1.0], &[4.0, 20.0]]),
+        ),
+        searched(
+            "resistance and inductance of the source before an input capacitor",
+            &[
+                knob("resistance", &["source.resistance"], OHMS),
+                // a filter that swings within a few periods to some hundreds; the lower ends keep the integrator's steps long enough
+                knob(
+                    "inductance",
+                    &["source.inductance"],
+                    Reach::Inductance(2e-3, 100.0, 0.02),
+                ),
+                knob("c_in", &["source.c_in"], Reach::Capacitance(0.05, 1e4, 0.5)),
+                knob("esr_in", &["source.esr_in"], OHMS),
+            ],
+            Search::Swing,
         ),
     ],
 };
@@ -84,11 +99,18 @@ pub(super) const DUTY_OFFSET: Cause = Cause {
 pub(super) const DUTY_QUANTISATION: Cause = Cause {
     id: "duty_quantisation",
     kind: Kind::Setting,
-    forms: &[searched(
-        "step of the duty",
-        &[knob("duty_lsb", &["pwm.duty_lsb"], Reach::Plain(0.0, 0.1, 1.0))],
-        Search::Counter,
-    )],
+    forms: &[
+        searched(
+            "step of the duty",
+            &[knob("duty_lsb", &["pwm.duty_lsb"], Reach::Plain(0.0, 0.1, 1.0))],
+            Search::Counter(Cut::Nearest),
+        ),
+        searched(
+            "step of the duty, which is cut off",
+            &[cutting("duty_lsb", &["pwm.duty_lsb"], Reach::Plain(0.0, 0.1, 1.0))],
+            Search::Counter(Cut::Below),
+        ),
+    ],
 };
 
 pub(super) const CPL_BANDWIDTH: Cause = Cause {
@@ -117,6 +139,16 @@ pub(super) const CPL_FOLD: Cause = Cause {
     )],
 };
 
+/// Records that step between so many resistors have the form with so many ([`crate::resistors`]).
+const EACH: &[Knob] = &[
+    resistor("resistor_1", 0),
+    resistor("resistor_2", 1),
+    resistor("resistor_3", 2),
+    resistor("resistor_4", 3),
+];
+const EACH_OF_3: &[Knob] = EACH.split_at(3).0;
+const EACH_OF_2: &[Knob] = EACH.split_at(2).0;
+
 pub(super) const LOAD_GAIN: Cause = Cause {
     id: "load_gain",
     kind: Kind::Setting,
@@ -133,6 +165,9 @@ pub(super) const LOAD_GAIN: Cause = Cause {
             "drawn over set load",
             &[knob("gain", &["load.setting_gain", "load.resistor_gain"], GAIN)],
         ),
+        form("real over set conductance of each resistor", EACH_OF_2),
+        form("real over set conductance of each resistor", EACH_OF_3),
+        form("real over set conductance of each resistor", EACH),
     ],
 };
 

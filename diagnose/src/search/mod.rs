@@ -1,6 +1,8 @@
 //! The search for a set of causes: forward with several leaders, exchange, backward, and what would do as well.
 
+mod forms;
 mod singles;
+pub(crate) mod sought;
 mod starts;
 mod weigh;
 
@@ -179,9 +181,12 @@ impl Searcher<'_> {
             best = self.polished(next);
             // where the edges have to do more than they can, it is another cause as well
             if self.structure(&best) > 0.0 || self.asks_for_edges(&best.state) {
-                best = self.swapped(best);
+                best = self.reformed(self.swapped(best));
             }
             leaders = larger;
+        }
+        if !self.is_hopeless(&best, before) {
+            best = self.reformed(best);
         }
         self.backward(best)
     }
@@ -213,7 +218,7 @@ impl Searcher<'_> {
             ..self.fitter
         };
         let fine = fitter.from(&fit.causes, &fit.values, &fit.state);
-        let is_step = |place: &(usize, usize)| self.search(place.0) == Search::Counter;
+        let is_step = |place: &(usize, usize)| matches!(self.search(place.0), Search::Counter(_));
         match fitter.places(&fit.causes).iter().position(is_step) {
             Some(place) => self.counted(fine, place),
             None => fine,

@@ -18,15 +18,18 @@ impl Searcher<'_> {
         let null = self.fitter.null;
         let all: Vec<usize> = (0..self.fitter.candidates.len()).collect();
         let first_order = parallel::map(&all, |cause| match self.search(*cause) {
-            Search::OwnOr(_) => {
+            Search::OwnOr(_) | Search::Knee | Search::Swing => {
                 let best = self.begins(&Set::NONE, *cause, null).into_iter().next();
                 best.map_or(0.0, |(expected, _)| null.chi2 - expected)
             }
             _ => gained(&self.fitter.sensitivity(*cause, null), &null.residual),
         });
         let most = first_order.iter().copied().fold(0.0, f64::max);
-        let is_followed =
-            |cause: usize| !self.begins_at_own(cause) || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED);
+        // a filter or a fall that is read off the records is far from its end, and promises little there
+        let is_followed = |cause: usize| match self.search(cause) {
+            Search::Knee | Search::Swing => first_order[cause] != 0.0,
+            _ => !self.begins_at_own(cause) || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED),
+        };
         let looked = progress::map(self.say, stage, &all, |cause| match is_followed(*cause) {
             true => self.looked_at(*cause),
             false => self.fitter.unmoved(*cause, first_order[*cause]),

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-use super::{Searcher, Set, TIE, gained};
+use super::{Searcher, Set, TIE, gained, sought};
 use crate::causes::Search;
 use crate::duty_steps;
 use crate::fit::{Fit, State};
@@ -16,6 +16,9 @@ use crate::spectrum;
 const COUNTS: usize = 8;
 /// First step of the refinement, counts: twice the distance of the numbers that are looked at, so that both neighbours are reached.
 const COUNT_STEP: f64 = 0.2;
+
+/// Rounds in which counts that are not whole move with the other causes: three to halve the step four times, and a bound alone.
+const MOST_COUNTS: usize = 12;
 
 /// A candidate and the place of one of its starts.
 type Start = (usize, usize);
@@ -65,7 +68,7 @@ impl Searcher<'_> {
         let mut looks: Vec<_> = looks.collect();
         looks.sort_by(|a, b| a.0.total_cmp(&b.0));
         match (looks.first(), self.search(cause)) {
-            (Some((_, step)), Search::Counter) => vec![self.refined(set, cause, from, step[0].recip())],
+            (Some((_, step)), Search::Counter(_)) => vec![self.refined(set, cause, from, step[0].recip())],
             _ => looks,
         }
     }
@@ -75,7 +78,7 @@ impl Searcher<'_> {
     /// and input capacitors, integrated in short steps, would take most of the time of a search.
     pub(super) fn tangents(&self, cause: usize, place: usize, state: &State) -> Arc<Vec<Vec<f64>>> {
         let listed = match self.search(cause) {
-            Search::From(_) | Search::OwnOr(_) => self.fitter.starts(cause).into_iter().nth(place),
+            Search::From(_) | Search::OwnOr(_) | Search::Knee => self.fitter.starts(cause).into_iter().nth(place),
             _ => None,
         };
         let Some(start) = listed else {
@@ -124,8 +127,9 @@ impl Searcher<'_> {
                     vec![line.amplitude, line.frequency, line.phase]
                 })]
             }
-            Search::Counter => {
-                let counts = duty_steps::likely(problem, self.fitter.basis, (from, beside), COUNTS);
+            Search::Swing => sought::swings(problem, residual, &problem.bases),
+            Search::Counter(cut) => {
+                let counts = duty_steps::likely(problem, self.fitter.basis, (from, beside), (cut, COUNTS));
                 counts.into_iter().map(|counts| vec![counts.recip()]).collect()
             }
             _ => self.fitter.starts(cause),
@@ -149,17 +153,31 @@ impl Searcher<'_> {
             self.fitter.from(&fit.causes, &values, &fit.state)
         });
         // counters have whole counts
-        let score = |fit: &Fit| {
-            fit.state.chi2
-                - if fit.values[place].recip().fract() < 1e-9 {
-                    TIE
-                } else {
-                    0.0
-                }
+        let is_whole = |fit: &Fit| {
+            let counts = fit.values[place].recip();
+            (counts - libm::round(counts)).abs() < 1e-9 * counts
         };
-        fits.into_iter().fold(
-            fit,
-            |best, other| if score(&other) < score(&best) { other } else { best },
-        )
+        let score = |fit: &Fit| fit.state.chi2 - if is_whole(fit) { TIE } else { 0.0 };
+        let better = |best: Fit, other: Fit| if score(&other) < score(&best) { other } else { best };
+        let mut best = fits.into_iter().fold(fit, better);
+        // one that has none was looked for where the other causes were then: it moves with them, by shares of a count
+        let mut step = 0.5 * COUNT_STEP;
+        for _ in 0..MOST_COUNTS {
+            if is_whole(&best) || step < COUNT_STEP / 20.0 {
+                break;
+            }
+            let at = best.values[place].recip();
+            let fits = parallel::map(&[at - step, at + step], |counts| {
+                let mut values = best.values.clone();
+                values[place] = counts.recip();
+                self.fitter.from(&best.causes, &values, &best.state)
+            });
+            let before = score(&best);
+            best = fits.into_iter().fold(best, better);
+            if score(&best) >= before {
+                step *= 0.5;
+            }
+        }
+        best
     }
 }

@@ -1,0 +1,79 @@
+//! Starts that the records themselves suggest: where an inductor may saturate, and how an input filter may swing.
+
+use std::f64::consts::TAU;
+
+use crate::causes::Bases;
+use crate::ideal::{self, Ideal};
+use crate::problem::Problem;
+use crate::record::Record;
+use crate::spectrum;
+
+/// Peaks of the current at the loads and duties of the records have to differ by this share: at one of them the inductor is a smaller one.
+/// Less than a fifth is what a steep core needs to fall.
+const APART: f64 = 0.1;
+/// Share of the rows whose peaks are lower, and higher: a few rows behind a step swing beyond it.
+const FEW: f64 = 0.02;
+/// Where between the lowest and the highest peak a fall may lie.
+const KNEES: [f64; 4] = [0.15, 0.4, 0.65, 0.9];
+/// The fall that a fit begins with: of most of the inductance, within a third of the current.
+const LOST: f64 = 0.6;
+const STEEP: f64 = 6.0;
+
+/// Share lost, current and steepness of falls that lie between the peaks that the records have; none if they are all about the same.
+pub(crate) fn knees(problem: &Problem) -> Vec<Vec<f64>> {
+    let peak = |record: &Record, row: usize| {
+        let (ideal, duty) = (Ideal::of(record, &problem.base.plant), record.duty[row]);
+        let drawn = ideal::drawn(&record.load[row], ideal.volts(duty));
+        let shown = record.measured[1].get(row).copied().filter(|i| i.is_finite());
+        shown.unwrap_or_else(|| ideal.inductor(drawn, duty)) + ideal.half(duty)
+    };
+    let records = problem.records.iter().filter(|record| record.capture.is_none());
+    let mut peaks: Vec<f64> = records
+        .flat_map(|record| (0..record.rows()).map(move |row| (record, row)))
+        .map(|(record, row)| peak(record, row))
+        .filter(|peak| peak.is_finite())
+        .collect();
+    peaks.sort_by(f64::total_cmp);
+    let few = (FEW * peaks.len() as f64) as usize;
+    let (Some(low), Some(high)) = (
+        peaks.get(few),
+        peaks.len().checked_sub(few + 1).and_then(|at| peaks.get(at)),
+    ) else {
+        return Vec::new();
+    };
+    if *high < (1.0 + APART) * low {
+        return Vec::new();
+    }
+    let of = |share: f64| vec![LOST, low + share * (high - low), STEEP];
+    KNEES.map(of).to_vec()
+}
+
+/// Impedances of an input filter where its inductor and capacitor swing, as shares of the resistance that the converter is to its source.
+/// Higher ones swing against the converter's negative resistance for ever; lower ones leave no trace.
+const IMPEDANCES: [f64; 2] = [0.03, 0.12];
+/// Damping that a fit begins with, as a share of that impedance.
+const DAMPED: f64 = 0.1;
+
+/// Resistance, inductance, capacitance and its series resistance of input filters that swing as the input voltage does, or where nobody has
+/// measured that, current and output voltage; none where nothing swings.
+pub(crate) fn swings(problem: &Problem, residual: &[f64], bases: &Bases) -> Vec<Vec<f64>> {
+    let is_measured = |channel: usize| {
+        let mut records = problem.records.iter().filter(|record| !record.settled);
+        records.any(|record| record.measured[channel].iter().any(|value| value.is_finite()))
+    };
+    // the output filter lets little of it through to the voltage, and the inductor's current shows it best
+    let channels = if is_measured(3) { &[3][..] } else { &[1, 0] };
+    let power = bases.v * bases.i;
+    let seen = bases.v_in * bases.v_in / power;
+    let of = |frequency: f64| {
+        let rate = TAU * frequency;
+        IMPEDANCES.map(|share| {
+            let z = share * seen;
+            vec![0.5 * DAMPED * z, z / rate, 1.0 / (z * rate), 0.5 * DAMPED * z]
+        })
+    };
+    let found = channels
+        .iter()
+        .flat_map(|channel| spectrum::swings(problem, residual, *channel));
+    found.flat_map(of).collect()
+}

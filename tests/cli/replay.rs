@@ -219,8 +219,15 @@ fn replay_takes_previous_duty_from_the_log() {
     desk.succeed("replay buck12 log.csv --exploring");
     desk.write("log.csv", &log("duty", &duties, &|k| 10.0 * (before(k) - 0.5)));
     desk.succeed("replay buck12 log.csv");
+    // the log begins in mid-run: its first duty is not that of the contract
     desk.write("log.csv", &log("previous_duty", &duties, &|k| 10.0 * (duties(k) - 0.5)));
-    desk.succeed("replay buck12 log.csv");
+    let said = desk.type_in("replay buck12 log.csv");
+    assert!(
+        said.code == Some(1) && said.stdout.contains("look at initial_duty"),
+        "{}",
+        said.stdout
+    );
+    desk.succeed("replay buck12 log.csv --skip 1");
     desk.write("log.csv", &log("previous_duty", &|_| 0.9, &|_| 4.0));
     desk.refuse(
         "replay buck12 log.csv",

@@ -114,19 +114,19 @@ fn an_input_filter_that_rings_is_named() {
     }
 }
 
-// with 47 counts the eight levels of these records are those of another counter, a winding and a diode as well: docs/explanation/limits.md
+// not beside another cause, and not at every count: docs/explanation/limits.md
 #[test]
-fn a_modulator_that_cuts_off_is_named_beside_a_winding() {
-    let mut d = drawn(41);
-    (d.lab.counts, d.lab.floors) = (64.0, true);
-    d.lab.dcr += 0.04 * d.v_out / d.i_l;
-    let resistors = d.resistors();
-    let findings = found(&mut d, &resistors, &ALL);
-    println!("{}", findings.sentence);
-    assert!(is_answered(&findings), "{:?}", findings.verdict);
-    assert_eq!(ids(&findings), ["dcr", "duty_quantisation"]);
-    is_near(&findings, "duty_quantisation", "duty_lsb", 1.0 / 64.0, 0.002);
-    is_near(&findings, "dcr", "dcr", d.lab.dcr, 0.03);
+fn a_modulator_that_cuts_off_is_named() {
+    for (seed, counts) in [(41, 64.0), (42, 47.0)] {
+        let mut d = drawn(seed);
+        (d.lab.counts, d.lab.floors) = (counts, true);
+        let resistors = d.resistors();
+        let findings = found(&mut d, &resistors, &ALL);
+        println!("{seed}: {}", findings.sentence);
+        assert!(is_answered(&findings), "{:?}", findings.verdict);
+        assert_eq!(ids(&findings), ["duty_quantisation"]);
+        is_near(&findings, "duty_quantisation", "duty_lsb", 1.0 / counts, 0.002);
+    }
 }
 
 /// What the records cannot tell apart is a tie of the two, and the time is that of the edge.

@@ -32,7 +32,7 @@ pub fn notes(problem: &Problem, outliers: &[Outlier]) -> Vec<String> {
         let list: Vec<String> = channels.collect();
         (!list.is_empty()).then(|| {
             format!(
-                "{}: {} are left out: the load steps at these samples, and the record does not say what it did before each",
+                "{}: {} are left out: the load steps at the very instant of these samples, and whether they were taken before or behind it the record does not say",
                 record.name,
                 list.join(" and ")
             )

@@ -29,6 +29,44 @@ fn a_small_network_meets_its_period_at_a_usual_clock_and_misses_it_at_a_slow_one
     desk.succeed("verify policy --generated out --steps 10");
 }
 
+/// A policy that samples in the middle of the period has half of it: verdict and advice are of that half.
+#[test]
+fn what_is_left_of_the_period_behind_the_sample_counts() {
+    let desk = Desk::new("minimal");
+    let plant = |phase: &str| {
+        format!(
+            "[converter]\nv_in = 200.0\ninductance = 2e-3\ncapacitance = 1.5e-3\nf_sw = 10e3\n[pwm]\nsampling_phase = {phase}\n"
+        )
+    };
+    let compile = "compile policy --target cortex-m4f --clock 1.5MHz --out out";
+    let whole = desk.succeed(compile);
+    let share = |said: &str| {
+        let line = said.lines().find(|line| line.contains("-O2: ")).unwrap().to_owned();
+        let shown = line.split("; ").last().unwrap().split(" %").next().unwrap().to_owned();
+        let least: f64 = shown.split(" to ").next().unwrap().parse().unwrap();
+        (line, least)
+    };
+    desk.write("plant.toml", &plant("0.5"));
+    let (line, least) = share(&desk.succeed(&format!("{compile} --plant plant.toml")));
+    assert!(
+        line.contains("the 50 % of the control period behind the sample: "),
+        "{line}"
+    );
+    assert!((least - 2.0 * share(&whole).1).abs() <= 2.0, "{line}\n{whole}");
+    // at the start of the period nothing of it is gone
+    desk.write("plant.toml", &plant("0.0"));
+    assert_eq!(
+        share(&desk.succeed(&format!("{compile} --plant plant.toml"))),
+        share(&whole)
+    );
+    let alone = desk.type_in("compile policy --target cortex-m4f --plant plant.toml --out out");
+    assert!(
+        alone.code == Some(2) && alone.stderr.contains("--clock"),
+        "{}",
+        alone.stderr
+    );
+}
+
 /// The advice is taken: a network of the size that is named meets its period, one a step wider does not.
 #[test]
 fn a_network_that_fits_is_named() {
@@ -72,7 +110,7 @@ fn a_network_that_fits_is_named() {
             .unwrap()
             .files;
         let costs = verify::costs::StepCosts::of(&cut, target, &[codegen::Language::C], &files);
-        let clock = verify::budget::Clock { hz: 20e6 };
+        let clock = verify::budget::Clock { hz: 20e6, part: 1.0 };
         let fit = |costs| verify::budget::Budget::of(costs, clock, cut.sample_period).unwrap().fit;
         costs.measured().any(|costs| fit(costs) == verify::budget::Fit::Met)
     };

@@ -102,6 +102,12 @@ fn a_log_becomes_golden_answers_that_judge_a_format() {
         inspected.contains(line(&replayed).trim_start_matches("in i8: ")),
         "{inspected} {replayed}"
     );
+    // answers without Q values tell the activation, too, where they are many
+    desk.edit("buck12/policy.toml", "\"relu\"", "\"tanh\"");
+    let misread = desk.type_in("inspect buck12");
+    let hint = "with hidden_activation = \"relu\" the same weights give all 120 golden answers";
+    assert!(misread.stderr.contains(hint), "{}", misread.stderr);
+    desk.edit("buck12/policy.toml", "\"tanh\"", "\"relu\"");
     let again = desk.type_in("replay buck12 log.csv --golden buck12/of_log.safetensors");
     assert!(
         again.code == Some(2) && again.stderr.contains("another name with --golden"),

@@ -180,7 +180,7 @@ fn too_many(
     costs: &StepCosts,
     clock: Clock,
 ) -> Result<Option<String>, CodegenError> {
-    let cycles = clock.hz * policy.sample_period;
+    let cycles = clock.hz * policy.sample_period * clock.part;
     let least = costs.measured().min_by_key(|costs| costs.instructions_max);
     let (Some(most), Some(least)) = (target.most_per_cycle, least) else {
         return Ok(None);
@@ -225,12 +225,16 @@ fn unmodelled(
     costs: &StepCosts,
     clock: Clock,
 ) -> Result<String, CodegenError> {
-    let cycles = clock.hz * policy.sample_period;
+    let cycles = clock.hz * policy.sample_period * clock.part;
+    let what = match clock.part {
+        part if part < 1.0 => "what is left of a control period behind the sample",
+        _ => "a control period",
+    };
     if let Some(text) = too_many(policy, target, outputs, costs, clock)? {
         return Ok(text);
     }
     let mut text = format!(
-        "  cannot be said: no cycles are modelled for {} (`policyc targets` says for which they are); a control period is {} cycles at {clock}",
+        "  cannot be said: no cycles are modelled for {} (`policyc targets` says for which they are); {what} is {} cycles at {clock}",
         target.name,
         grouped(cycles as u64)
     );

@@ -8,11 +8,13 @@ use serde::Serialize;
 
 use crate::measure::Costs;
 
-/// Clock of a processor.
+/// Clock of a processor, and the time that a step has at it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clock {
     /// Frequency, Hz.
     pub hz: f64,
+    /// Part of the control period in which a step has to be done, 0..1: 1 unless the sample lies inside of it.
+    pub part: f64,
 }
 
 /// Frequencies that a processor could have, in Hz.
@@ -43,12 +45,20 @@ impl Clock {
             .map_err(|_| "a number is missing: expected a frequency such as 168MHz".to_owned())?;
         let hz = number * factor;
         if (PLAUSIBLE.0..=PLAUSIBLE.1).contains(&hz) {
-            Ok(Self { hz })
+            Ok(Self { hz, part: 1.0 })
         } else {
             Err(format!(
                 "{hz} Hz is no clock of a processor: expected 1 kHz to 100 GHz, such as 168MHz"
             ))
         }
+    }
+}
+
+impl Clock {
+    /// The same for steps that have to be done in this part of the control period.
+    #[must_use]
+    pub fn within(self, part: f64) -> Self {
+        Self { part, ..self }
     }
 }
 
@@ -88,12 +98,21 @@ pub enum Fit {
 pub struct Budget {
     /// Clock in Hz.
     pub clock_hz: f64,
-    /// Cycles of a control period at that clock.
+    /// Cycles that a step has at that clock: of a control period, or of what is left of it behind the sample.
     pub period_cycles: f64,
-    /// Least and largest share of the period that the model says.
+    /// Which part of the control period these are.
+    #[serde(skip_serializing_if = "is_whole")]
+    pub part: f64,
+    /// Least and largest share of these cycles that the model says.
     pub share: (f64, f64),
     /// What follows.
     pub fit: Fit,
+}
+
+/// Whether a step has the whole period.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "what serde calls")]
+fn is_whole(part: &f64) -> bool {
+    *part >= 1.0
 }
 
 impl Budget {
@@ -101,11 +120,12 @@ impl Budget {
     #[must_use]
     pub fn of(costs: &Costs, clock: Clock, period: f64) -> Option<Self> {
         let (least, most) = costs.model_cycles?;
-        let period_cycles = clock.hz * period;
+        let period_cycles = clock.hz * period * clock.part;
         let share = (least as f64 / period_cycles, most as f64 / period_cycles);
         Some(Self {
             clock_hz: clock.hz,
             period_cycles,
+            part: clock.part,
             share,
             fit: match share {
                 (_, most) if most <= 1.0 => Fit::Met,
@@ -118,6 +138,10 @@ impl Budget {
     /// When the duty of a step acts, where that may be a period later than one thinks; `None` where it fits into half of the period.
     #[must_use]
     pub fn lateness(&self, observers: &[Observer]) -> Option<String> {
+        // what fits behind the sample acts from the next start on, as the training had it
+        if !is_whole(&self.part) {
+            return None;
+        }
         let most = self.share.1;
         let counts_on_it = !observers.is_empty() && observers.iter().all(|observer| observer.compute_delay == 1);
         if self.fit != Fit::Missed && most > HALF && counts_on_it {
@@ -163,21 +187,42 @@ impl Budget {
     pub fn text(&self, build: &str) -> String {
         let (least, most) = (100.0 * self.share.0, 100.0 * self.share.1);
         let period = grouped(self.period_cycles as u64);
-        let clock = Clock { hz: self.clock_hz };
+        let clock = Clock {
+            hz: self.clock_hz,
+            part: self.part,
+        };
+        let is_whole = is_whole(&self.part);
+        let what = match is_whole {
+            true => "control period".to_owned(),
+            false => format!(
+                "the {:.0} % of the control period behind the sample:",
+                100.0 * self.part
+            ),
+        };
         let verdict = match self.fit {
             Fit::Met if 1.0 - self.share.1 < SCARCE => {
                 "met, with nothing left for interrupt entry and drivers at the worst".to_owned()
             }
+            Fit::Met if !is_whole => format!(
+                "met; {:.0} % of that is left for everything else at the worst",
+                100.0 - most
+            ),
             Fit::Met => format!(
                 "met, {}; {:.0} % of the period is left for everything else at the worst",
                 self.half(),
                 100.0 - most
             ),
+            Fit::Doubtful if is_whole => {
+                format!(
+                    "in doubt, {}: the model's fewest cycles fit, its most do not",
+                    self.half()
+                )
+            }
             Fit::Doubtful => "in doubt: the model's fewest cycles fit, its most do not".to_owned(),
             Fit::Missed => "NOT met".to_owned(),
         };
         format!(
-            "  {build}: control period {verdict}; {least:.0} to {most:.0} % of {period} cycles at {clock} (model at 0 wait states, never measured)"
+            "  {build}: {what} {verdict}; {least:.0} to {most:.0} % of {period} cycles at {clock} (model at 0 wait states, never measured)"
         )
     }
 }
@@ -195,7 +240,7 @@ mod tests {
             ("32768Hz", 32_768.0),
             (" 8000kHz ", 8e6),
         ] {
-            assert_eq!(Clock::parse(text), Ok(Clock { hz }), "{text}");
+            assert_eq!(Clock::parse(text), Ok(Clock { hz, part: 1.0 }), "{text}");
         }
         for text in [
             "168",
@@ -211,7 +256,7 @@ mod tests {
         ] {
             assert!(Clock::parse(text).is_err(), "{text}");
         }
-        assert_eq!(Clock { hz: 168e6 }.to_string(), "168 MHz");
+        assert_eq!(Clock { hz: 168e6, part: 1.0 }.to_string(), "168 MHz");
     }
 
     #[test]
@@ -228,13 +273,14 @@ mod tests {
             library_calls: Vec::new(),
         };
         // 100 us at 100 MHz are 10,000 cycles
-        let fit = |cycles| Budget::of(&costs(Some(cycles)), Clock { hz: 1e8 }, 1e-4).map(|budget| budget.fit);
+        let fit =
+            |cycles| Budget::of(&costs(Some(cycles)), Clock { hz: 1e8, part: 1.0 }, 1e-4).map(|budget| budget.fit);
         assert_eq!(fit((5_000, 9_999)), Some(Fit::Met));
         assert_eq!(fit((5_000, 10_001)), Some(Fit::Doubtful));
         assert_eq!(fit((10_001, 20_000)), Some(Fit::Missed));
-        assert_eq!(Budget::of(&costs(None), Clock { hz: 1e8 }, 1e-4), None);
+        assert_eq!(Budget::of(&costs(None), Clock { hz: 1e8, part: 1.0 }, 1e-4), None);
         let lateness = |cycles| {
-            Budget::of(&costs(Some(cycles)), Clock { hz: 1e8 }, 1e-4)
+            Budget::of(&costs(Some(cycles)), Clock { hz: 1e8, part: 1.0 }, 1e-4)
                 .unwrap()
                 .lateness(&[])
         };
@@ -251,9 +297,22 @@ mod tests {
         );
         // what does not fit at all is another matter
         assert_eq!(lateness((10_001, 20_000)), None);
+        // half of the period is NOT met where half of the fewest cycles do not fit
+        let half = |cycles| {
+            let clock = Clock { hz: 1e8, part: 1.0 }.within(0.5);
+            Budget::of(&costs(Some(cycles)), clock, 1e-4).unwrap()
+        };
+        assert_eq!(half((5_001, 5_002)).fit, Fit::Missed);
+        assert_eq!(half((4_000, 5_002)).fit, Fit::Doubtful);
+        assert!(
+            half((2_000, 2_500))
+                .text("gcc")
+                .contains("the 50 % of the control period behind the sample: met; 50 % of that is left")
+        );
+        assert_eq!(half((2_000, 4_900)).lateness(&[]), None);
         // what leaves less than interrupt entry takes leaves nothing
         let text = |cycles| {
-            Budget::of(&costs(Some(cycles)), Clock { hz: 1e8 }, 1e-4)
+            Budget::of(&costs(Some(cycles)), Clock { hz: 1e8, part: 1.0 }, 1e-4)
                 .unwrap()
                 .text("gcc")
         };

@@ -188,6 +188,9 @@ pub struct Compile {
     /// and which numeric format would
     #[arg(long, value_name = "FREQUENCY", value_parser = Clock::parse, conflicts_with = "no_costs")]
     pub clock: Option<Clock>,
+    /// Plant file of the training: where it samples inside of the period (`pwm.sampling_phase`), a step has what is left of that
+    #[arg(long, value_name = "FILE", requires = "clock")]
+    pub plant: Option<PathBuf>,
     /// Control steps in the kit; those that lead to the places where an edit would hide, some hundred, are made in any case
     #[arg(long, value_name = "N", default_value_t = ::verify::kit::DEFAULT_STEPS, value_parser = clap::value_parser!(u32).range(1..=i64::from(::verify::kit::MOST_STEPS)))]
     pub kit_steps: u32,

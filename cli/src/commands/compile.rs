@@ -68,6 +68,7 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     // a name that is no target's is said before a policy is read
     codegen::target(&options.target)?;
     let policy = super::load_several_as(&options.policy, options.outside, options.format)?;
+    let clock = clock(options, &policy)?;
     let working = Working::new(match options.no_costs {
         true => "generating",
         false => "generating, and building to measure a step",
@@ -79,7 +80,7 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
             emit: options.emit.clone(),
             kit_steps: options.kit_steps,
             costs: !options.no_costs,
-            clock: options.clock,
+            clock,
             golden_decisions: options.golden_decisions,
         },
     )?;
@@ -89,20 +90,20 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
         talk::note(&format!("{} has the core `{}`", options.target, made.target.name));
     }
     let written = write(&options.out, &made.files, &made.archives, options.replacing)?;
-    let costs = made.costs.texts(&policy, made.target, options.clock);
-    let budget = match options.clock {
+    let costs = made.costs.texts(&policy, made.target, clock);
+    let budget = match clock {
         Some(clock) => advice::lines(&policy, made.target, &made.outputs, &made.costs, clock)?,
         None => Vec::new(),
     };
     if let Some(path) = &options.report {
         output::replace_own_one(
             path,
-            &page(options, &policy, &made, &costs, &budget)?,
+            &page(options, clock, &policy, &made, &costs, &budget)?,
             options.replacing,
         )?;
     }
     if options.json {
-        say_json(options, &policy, &made, &costs, budget)?;
+        say_json(options, clock, &policy, &made, &costs, budget)?;
         return Ok(Outcome::Done);
     }
     say(&policy, made.target, &written, &made.archives, &made.decisions)?;
@@ -115,9 +116,24 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
+/// The clock, with the part of the period that a policy has which is trained on `--plant`: sampled inside of the period, and with a duty that
+/// acts from the next start on, it has what is left behind the sample.
+fn clock(options: &Compile, policy: &Policy) -> Result<Option<Clock>, Failure> {
+    let plant = options.plant.as_ref().map(plant::Parameters::from_file).transpose()?;
+    let part = plant.map_or(1.0, |plant| {
+        let phase = plant.pwm.sampling_phase;
+        match plant.pwm.duty_delay == 0 && phase > 0.0 {
+            true => ((1.0 - phase) * plant.t_sw() / policy.sample_period).min(1.0),
+            false => 1.0,
+        }
+    });
+    Ok(options.clock.map(|clock| clock.within(part)))
+}
+
 /// The page that `--report` asks for.
 fn page(
     options: &Compile,
+    clock: Option<Clock>,
     policy: &Policy,
     made: &Made,
     costs: &[String],
@@ -141,7 +157,7 @@ fn page(
             .collect(),
         costs: &made.costs,
         cost_texts: costs,
-        clock: options.clock,
+        clock,
         budget,
         notes: &notes,
     })?;
@@ -198,6 +214,7 @@ impl<'a> Packed<'a> {
 
 fn say_json(
     options: &Compile,
+    clock: Option<Clock>,
     policy: &Policy,
     made: &Made,
     costs: &[String],
@@ -219,7 +236,7 @@ fn say_json(
         numeric_format: policy.numeric_format,
         sample_period: policy.sample_period,
         sizes,
-        costs: made.costs.entries(policy, options.clock),
+        costs: made.costs.entries(policy, clock),
         budget,
         out: &options.out,
         files: files.iter().map(written).collect(),

@@ -69,10 +69,17 @@ fn verdict(shown: &Shown<'_>) -> (Verdict, &'static str, String) {
     };
     let (least, most) = budget.share;
     let share = format!(
-        "A step takes {:.0} to {:.0} % of its period at {}, by a model of the processor.",
+        "A step takes {:.0} to {:.0} % of {} at {}, by a model of the processor.",
         100.0 * least,
         100.0 * most,
-        Clock { hz: budget.clock_hz }
+        match budget.part {
+            part if part < 1.0 => "what is left of its period behind the sample",
+            _ => "its period",
+        },
+        Clock {
+            hz: budget.clock_hz,
+            part: budget.part
+        }
     );
     let (verdict, word) = match budget.fit {
         Fit::Met => (Verdict::Pass, "fits"),

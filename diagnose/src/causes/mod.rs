@@ -159,8 +159,10 @@ impl Candidate {
     /// Whether it changes one of these numbers of the plant file.
     #[must_use]
     pub fn changes(&self, keys: &[String]) -> bool {
-        let mut own = self.form.knobs.iter().flat_map(|knob| knob.keys);
-        own.any(|key| keys.iter().any(|one| one == key))
+        let has = |key: &str| keys.iter().any(|one| one == key);
+        let mut knobs = self.form.knobs.iter();
+        // a factor of one resistor has no key of its own
+        knobs.any(|knob| knob.keys.iter().any(|key| has(key)) || knob.is_resistor() && has("load.resistor_gain"))
     }
 
     /// Starts that are given in steps of its parameters: above the model's value, or of several parameters as they are.

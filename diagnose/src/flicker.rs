@@ -67,8 +67,8 @@ pub(crate) fn bias(measured: &[f64]) -> f64 {
     if digit <= 0.0 || noise.is_nan() {
         return 0.0;
     }
-    // less what rounding adds to it
-    let square = ((noise / digit).powi(2) - 1.0 / 12.0).max(0.0);
+    // less the most that rounding adds to it: between two digits a quarter, as of a coin, whatever the noise is
+    let square = ((noise / digit).powi(2) - 0.25).max(0.0);
     digit / PI * libm::exp(-2.0 * PI * PI * square)
 }
 

@@ -157,7 +157,7 @@ mod tests {
             .collect();
         let mut spiked = quiet.clone();
         (spiked[70], spiked[71]) = (spiked[70] + 150.0, spiked[71] - 120.0);
-        (spiked[140], spiked[141]) = (spiked[140] - 90.0, spiked[141] - 110.0);
+        (spiked[140], spiked[141]) = (spiked[140] - 190.0, spiked[141] - 210.0);
         let mut moved = quiet.clone();
         for (n, value) in moved.iter_mut().enumerate().skip(50) {
             // a step, and a kick that dies in some rows

@@ -60,17 +60,35 @@ pub fn as_plant(model: &Model, trim: f64) -> Parameters {
 pub fn extended_plant(diagnosis: &Diagnosis) -> Parameters {
     let mut plant = as_plant(&diagnosis.extended, diagnosis.trim);
     crate::quantised::extend(&mut plant, &diagnosis.findings.causes);
-    plant
+    readable(&plant, &diagnosis.given.model.plant)
+}
+
+/// A plant whose numbers, where they differ from those `given`, have as many digits as a fit tells, and more.
+fn readable(plant: &Parameters, given: &Parameters) -> Parameters {
+    let mut readable = plant.clone();
+    for parameter in plant::parameters() {
+        let value = parameter.get(plant);
+        if value != parameter.get(given) {
+            parameter.set(&mut readable, rounded(value));
+        }
+    }
+    readable
+}
+
+/// Seven digits: no fit tells more than five.
+pub(crate) fn rounded(number: f64) -> f64 {
+    format!("{number:.6e}").parse().unwrap_or(number)
 }
 
 /// Text of `plant.extended.toml`; changed numbers carry what they were and their 95 % interval.
 #[must_use]
 pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     let findings = &diagnosis.findings;
-    let mut text = format!(
-        "# The model with what was found. {}\n",
-        findings.sentence.replace('\n', " ")
-    );
+    let head = match findings.verdict {
+        Verdict::Consistent => "The model as it was given.",
+        _ => FOUND,
+    };
+    let mut text = format!("# {head} {}\n", findings.sentence.replace('\n', " "));
     for cause in findings.causes.iter().filter(|cause| !cause.rivals.is_empty()) {
         let rivals: Vec<String> = cause.rival_values.iter().map(|values| needs(values)).collect();
         let _ = writeln!(text, "# {} stands for a tie with {}.", cause.id, rivals.join(", "));
@@ -112,7 +130,8 @@ pub fn partial_toml(diagnosis: &Diagnosis) -> Option<String> {
     for worth in &findings.partial_gain {
         let _ = writeln!(text, "# {}", worth.words());
     }
-    Some(written(diagnosis, text, &as_plant(&state.model, trim), trim))
+    let plant = readable(&as_plant(&state.model, trim), &diagnosis.given.model.plant);
+    Some(written(diagnosis, text, &plant, trim))
 }
 
 /// A plant file below the comment `text`: that of the user with its order and comments, where it is known.
@@ -126,7 +145,7 @@ fn written(diagnosis: &Diagnosis, mut text: String, after: &Parameters, trim: f6
         );
     }
     let notes = notes(diagnosis, after, trim);
-    let own = diagnosis.model_text.as_deref();
+    let own = diagnosis.model_text.as_deref().map(without_head);
     if let Some(edited) = own.and_then(|own| edited::edited(own, before, after, &notes)) {
         return format!("{text}\n{edited}");
     }
@@ -153,6 +172,18 @@ fn written(diagnosis: &Diagnosis, mut text: String, after: &Parameters, trim: f6
         let _ = write!(text, "\n[{table}]\n{lines}");
     }
     text
+}
+
+/// How the head of an extended model begins.
+const FOUND: &str = "The model with what was found.";
+
+/// A plant file without the head of the diagnosis that made it: what that one found is the model by now.
+fn without_head(text: &str) -> &str {
+    let is_made = text.strip_prefix("# ").is_some_and(|rest| rest.starts_with(FOUND));
+    match text.split_once("\n\n") {
+        Some((_, rest)) if is_made => rest,
+        _ => text,
+    }
 }
 
 /// What is said of each number that has changed: its unit, its interval, and what it was.
@@ -199,7 +230,15 @@ fn notes(diagnosis: &Diagnosis, after: &Parameters, trim: f64) -> BTreeMap<&'sta
 
 #[cfg(test)]
 mod tests {
-    use super::told;
+    use super::{told, without_head};
+
+    #[test]
+    fn the_head_of_an_earlier_diagnosis_is_not_kept() {
+        let made = "# The model with what was found. The model gets dcr wrong.\n# dcr stands for a tie.\n\n# mine\n[converter]\n";
+        assert_eq!(without_head(made), "# mine\n[converter]\n");
+        let own = "# The board\n\n[converter]\n";
+        assert_eq!(without_head(own), own);
+    }
 
     /// At each frequency a tenth of a nanosecond is what a fit leaves, and two nanoseconds are what a gate does.
     #[test]

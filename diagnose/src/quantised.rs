@@ -92,7 +92,7 @@ pub fn note(problem: &Problem) -> Option<String> {
         .collect();
     (!each.is_empty()).then(|| {
         format!(
-            "values lie on the steps of an analogue-to-digital converter, which are lost in the noise and no cause: {}",
+            "values lie on the steps of an analogue-to-digital converter, which are lost in the noise and no cause; nothing has to be done: {}",
             each.join(", ")
         )
     })

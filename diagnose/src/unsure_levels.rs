@@ -69,7 +69,7 @@ pub(crate) fn note(problem: &mut Problem, state: &State) {
         if !levels.is_empty() {
             record.repairs.push(format!(
                 "{} of its load {} so unsure for the noise of the meter that the voltage shows it: estimated beside the fit, up to {most:.1} \
-                 standard deviations from the mean of the rows",
+                 standard deviations from the mean of the rows; nothing has to be done",
                 match levels.len() {
                     1 => "1 level".to_owned(),
                     more => format!("{more} levels"),

@@ -89,7 +89,7 @@ fn a_capacitor_that_lost_a_third_is_found_below_a_coarse_meter() {
     assert!((c / 100e-6 - 1.0).abs() < 0.02, "{c}");
     let notes = found.findings.noise.repairs.join("\n");
     for wanted in [
-        "i_out is taken for a load current of 5 levels",
+        "i_out is taken for a load current in 5 stretches at rest",
         "fitted: ",
         "rows of v_o",
         "are left out",

@@ -57,7 +57,7 @@ fn a_healthy_bench_with_a_noisy_load_current_is_consistent() {
         assert_eq!(found.findings.verdict, Verdict::Consistent, "noise {noise} A");
         let notes = found.findings.noise.repairs.join("\n");
         assert!(
-            notes.contains("i_out is taken for a load current of 5 levels"),
+            notes.contains("i_out is taken for a load current in 5 stretches at rest"),
             "{notes}"
         );
     }
@@ -137,7 +137,7 @@ fn a_load_that_slopes_from_level_to_level_is_one_step_inside_a_period() {
         assert_eq!(found.findings.verdict, Verdict::Consistent, "noise {noise} A");
         let notes = found.findings.noise.repairs.join("\n");
         for wanted in [
-            "a load current of 5 levels, with",
+            "a load current in 5 stretches at rest, with",
             "4 load steps are taken to lie inside a switching period",
         ] {
             assert!(notes.contains(wanted), "{wanted}: {notes}");

@@ -326,7 +326,8 @@ impl GoldenResult {
 }
 
 /// What is open without golden vectors.
-pub const UNPROVEN: &str = "no golden vectors: nothing shows that the weights were read as the trainer meant";
+pub const UNPROVEN: &str = "no golden vectors: nothing shows that the weights were read as the trainer meant; answers of the trainer do, \
+                             or of its log (`policyc replay --golden`)";
 
 #[cfg(test)]
 mod tests {

@@ -188,8 +188,31 @@ fn keys(path: &str) -> Vec<&'static str> {
     keys
 }
 
-/// A key that stands in the wrong table.
+/// Tables that a circuit suggests, and where their numbers stand.
+const BY_PART: [(&[&str], &str); 6] = [
+    (&["diode", "freewheel", "rectifier"], "`switch.v_f` and `switch.r_d`"),
+    (
+        &["mosfet", "fet", "transistor", "igbt"],
+        "`switch.r_ds_on` and `switch.r_ds_on_low`",
+    ),
+    (&["coil", "choke", "l"], "`inductor.dcr`, and `converter.inductance`"),
+    (
+        &["esr", "output_capacitor", "c"],
+        "`capacitor.esr`, and `converter.capacitance`",
+    ),
+    (
+        &["sensor", "adc", "measurement"],
+        "`sensors.v_out.lsb`, `sensors.v_out.noise` and their like",
+    ),
+    (&["input", "supply"], "`converter.v_in`, and `source.resistance`"),
+];
+
+/// A key that stands in the wrong table, or a table of a part that has its numbers elsewhere.
 fn elsewhere(key: &str) -> Option<String> {
-    let parameter = catalogue::parameters().find(|p| p.key.rsplit('.').next() == Some(key))?;
-    Some(format!("did you mean `{}`?", parameter.key))
+    if let Some(parameter) = catalogue::parameters().find(|p| p.key.rsplit('.').next() == Some(key)) {
+        return Some(format!("did you mean `{}`?", parameter.key));
+    }
+    let part = key.to_lowercase();
+    let (_, keys) = BY_PART.iter().find(|(names, _)| names.contains(&part.as_str()))?;
+    Some(format!("a plant file has these as {keys}"))
 }

@@ -49,6 +49,17 @@ fn all_faults_come_at_once_with_place_and_hint() {
 }
 
 #[test]
+fn a_table_of_a_part_is_told_where_its_numbers_stand() {
+    for (table, keys) in [
+        ("[diode]\nv_f = 0.8\n", "`switch.v_f` and `switch.r_d`"),
+        ("[MOSFET]\nr_on = 0.1\n", "`switch.r_ds_on`"),
+    ] {
+        let message = message(&format!("{CIRCUIT}{table}"));
+        assert!(message.contains("plant.toml:6:") && message.contains(keys), "{message}");
+    }
+}
+
+#[test]
 fn ranges_and_partners_are_checked() {
     let out = message(&format!("{CIRCUIT}[switch]\ndead_time = 2\n"));
     assert!(out.contains("plant.toml:7:13") && out.contains("0 to 0.001 s"), "{out}");

@@ -59,6 +59,13 @@ fn what_is_left_of_the_period_behind_the_sample_counts() {
         share(&desk.succeed(&format!("{compile} --plant plant.toml"))),
         share(&whole)
     );
+    // where half of it is too little, the way to the whole is said
+    desk.write("plant.toml", &plant("0.5"));
+    let missed = desk.succeed("compile policy --target cortex-m4f --clock 1MHz --plant plant.toml --out out");
+    assert!(
+        missed.contains("trained again with pwm.sampling_phase = 0 and pwm.duty_delay = 1"),
+        "{missed}"
+    );
     let alone = desk.type_in("compile policy --target cortex-m4f --plant plant.toml --out out");
     assert!(
         alone.code == Some(2) && alone.stderr.contains("--clock"),
@@ -110,7 +117,7 @@ fn a_network_that_fits_is_named() {
             .unwrap()
             .files;
         let costs = verify::costs::StepCosts::of(&cut, target, &[codegen::Language::C], &files);
-        let clock = verify::budget::Clock { hz: 20e6, part: 1.0 };
+        let clock = verify::budget::Clock::parse("20MHz").unwrap();
         let fit = |costs| verify::budget::Budget::of(costs, clock, cut.sample_period).unwrap().fit;
         costs.measured().any(|costs| fit(costs) == verify::budget::Fit::Met)
     };

@@ -7,9 +7,10 @@ use policy::{NumericFormat, Policy};
 use report::grouped;
 use targets::TargetSpec;
 
-use crate::budget::{Budget, Clock, Fit};
+use crate::budget::{Budget, Clock, Fit, Slot};
 use crate::costs::StepCosts;
 use crate::fitting::{Bench, Fitting, Widest};
+use crate::lateness;
 use crate::measure::Costs;
 
 /// Whether a step of `outputs`' cores fits into its period at a clock, and which numeric format would if it does not: one
@@ -25,15 +26,18 @@ pub fn lines(
     clock: Clock,
 ) -> Result<Vec<String>, CodegenError> {
     let period = policy.sample_period;
-    let mut lines = vec![format!(
-        "budget of {} in {}:",
-        policy.name,
-        policy.numeric_format.name()
-    )];
     let budgets = costs
         .measured()
         .filter_map(|costs| Some((costs.build.as_str(), Budget::of(costs, clock, period)?)));
     let budgets: Vec<(&str, Budget)> = budgets.collect();
+    // the build that is done first: who is in a hurry takes that one
+    let soonest = budgets.iter().min_by(|a, b| a.1.share.1.total_cmp(&b.1.share.1));
+    let mut lines = vec![format!(
+        "budget of {} in {}:{}",
+        policy.name,
+        policy.numeric_format.name(),
+        soonest.map_or_else(String::new, |(build, budget)| format!(" {} ({build})", at_best(budget)))
+    )];
     lines.extend(budgets.iter().map(|(build, budget)| budget.text(build)));
     if budgets.is_empty() {
         lines.push(match target.cycles {
@@ -45,23 +49,31 @@ pub fn lines(
     if policy.numeric_format == NumericFormat::F32Fma {
         lines.push("  note: the model does not know fused operations; it says too little".to_owned());
     }
-    // of the build that is done first: who is in a hurry takes that one
-    let soonest = budgets.iter().min_by(|a, b| a.1.share.1.total_cmp(&b.1.share.1));
-    lines.extend(soonest.and_then(|(_, budget)| budget.lateness(&policy.observers)));
+    lines.extend(soonest.and_then(|(_, budget)| lateness::note(budget, clock.slot, &policy.observers)));
     if budgets.iter().any(|(_, budget)| budget.fit == Fit::Met) {
         return Ok(lines);
     }
-    let own = budgets.iter().map(|(build, budget)| Proposal {
-        format: policy.numeric_format,
-        build: (*build).to_owned(),
-        share: budget.share,
-    });
+    let own: Vec<Proposal> = budgets
+        .iter()
+        .map(|(build, budget)| Proposal {
+            format: policy.numeric_format,
+            build: (*build).to_owned(),
+            share: budget.share,
+        })
+        .collect();
     let others = proposals(policy, target, outputs, clock)?;
     let fits = others.iter().find(|proposal| proposal.share.1 <= 1.0);
     let nearest = || {
-        own.chain(others.iter().cloned())
-            .min_by(|a, b| a.share.1.total_cmp(&b.share.1))
+        let all = own.iter().chain(&others);
+        all.min_by(|a, b| a.share.1.total_cmp(&b.share.1)).cloned()
     };
+    let whole = whole_period(policy, clock.slot, &own, &others);
+    // training again is worth more than another processor, and less than another format
+    let (before, behind) = match fits {
+        Some(_) => (None, whole),
+        None => (whole, None),
+    };
+    lines.extend(before);
     match fits.cloned().or_else(nearest) {
         Some(Proposal { format, build, share }) if share.1 <= 1.0 => lines.push(format!(
             "  = hint: --format {} takes {:.0} to {:.0} % with {build}{}",
@@ -76,7 +88,42 @@ pub fn lines(
                 .to_owned(),
         ),
     }
+    lines.extend(behind);
     Ok(lines)
+}
+
+/// The verdict on the build that is done first.
+fn at_best(budget: &Budget) -> &'static str {
+    match budget.fit {
+        Fit::Met => "met at best",
+        Fit::Doubtful => "in doubt at best",
+        Fit::Missed => "NOT met, not even at best",
+    }
+}
+
+/// What a policy that samples inside of its period takes of the whole one, which it has if it is trained so: of the most exact format that
+/// fits then, else of one that may; `None` where none does.
+fn whole_period(policy: &Policy, slot: Slot, own: &[Proposal], others: &[Proposal]) -> Option<String> {
+    let Slot::Behind(part) = slot else { return None };
+    let whole = |proposal: &Proposal| (part * proposal.share.0, part * proposal.share.1);
+    let least = own.iter().min_by(|a, b| a.share.1.total_cmp(&b.share.1));
+    let ranked: Vec<&Proposal> = least.into_iter().chain(others).collect();
+    let surely = ranked.iter().find(|proposal| whole(proposal).1 <= 1.0);
+    let perhaps = || ranked.iter().find(|proposal| whole(proposal).0 <= 1.0);
+    let chosen = surely.or_else(perhaps)?;
+    let Proposal { format, build, .. } = chosen;
+    let (fewest, most) = whole(chosen);
+    let and_there = match policy.observers.is_empty() {
+        true => "",
+        false => ", and compute_delay = 1 in each [[observer]]",
+    };
+    Some(format!(
+        "  = hint: trained again with pwm.sampling_phase = 0 and pwm.duty_delay = 1 in the plant file{and_there}, a step has the whole period: \
+         {} with {build} takes {:.0} to {:.0} % of that",
+        format.name(),
+        100.0 * fewest,
+        100.0 * most
+    ))
 }
 
 /// What would help where no format fits: another clock or period, a smaller network, another activation.
@@ -89,8 +136,9 @@ fn too_slow(
 ) -> Vec<String> {
     let Proposal { format, build, share } = nearest;
     let mut lines = vec![format!(
-        "  = hint: no numeric format fits; next to it comes {} with {build}, {:.0} to {:.0} %: it fills a period of {:.0} us, or the \
+        "  = hint: no numeric format {}; next to it comes {} with {build}, {:.0} to {:.0} %: it fills a period of {:.0} us, or the \
          present one at {:.0} MHz{}",
+        if share.0 <= 1.0 { "surely fits" } else { "fits" },
         format.name(),
         100.0 * share.0,
         100.0 * share.1,
@@ -180,7 +228,7 @@ fn too_many(
     costs: &StepCosts,
     clock: Clock,
 ) -> Result<Option<String>, CodegenError> {
-    let cycles = clock.hz * policy.sample_period * clock.part;
+    let cycles = clock.hz * policy.sample_period * clock.slot.part();
     let least = costs.measured().min_by_key(|costs| costs.instructions_max);
     let (Some(most), Some(least)) = (target.most_per_cycle, least) else {
         return Ok(None);
@@ -225,9 +273,9 @@ fn unmodelled(
     costs: &StepCosts,
     clock: Clock,
 ) -> Result<String, CodegenError> {
-    let cycles = clock.hz * policy.sample_period * clock.part;
-    let what = match clock.part {
-        part if part < 1.0 => "what is left of a control period behind the sample",
+    let cycles = clock.hz * policy.sample_period * clock.slot.part();
+    let what = match clock.slot {
+        Slot::Behind(_) => "what is left of a control period behind the sample",
         _ => "a control period",
     };
     if let Some(text) = too_many(policy, target, outputs, costs, clock)? {

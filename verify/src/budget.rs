@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use policy::Observer;
 use report::grouped;
 use serde::Serialize;
 
@@ -13,8 +12,33 @@ use crate::measure::Costs;
 pub struct Clock {
     /// Frequency, Hz.
     pub hz: f64,
-    /// Part of the control period in which a step has to be done, 0..1: 1 unless the sample lies inside of it.
-    pub part: f64,
+    /// When a step has to be done.
+    pub slot: Slot,
+}
+
+/// What a step has of its period, and when its duty acts: what the converter of a training had.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Slot {
+    /// That converter is not known.
+    #[default]
+    Unknown,
+    /// Sampled at the start of the period, where the duty acts at once, as no timer does.
+    AtOnce,
+    /// The duty acts from the next start on; this part of the period, 0..1, lies behind the sample.
+    Behind(f64),
+    /// The duty acts a whole period later.
+    Later,
+}
+
+impl Slot {
+    /// Part of the control period in which a step has to be done.
+    #[must_use]
+    pub fn part(self) -> f64 {
+        match self {
+            Self::Behind(part) => part,
+            Self::Unknown | Self::AtOnce | Self::Later => 1.0,
+        }
+    }
 }
 
 /// Frequencies that a processor could have, in Hz.
@@ -45,7 +69,10 @@ impl Clock {
             .map_err(|_| "a number is missing: expected a frequency such as 168MHz".to_owned())?;
         let hz = number * factor;
         if (PLAUSIBLE.0..=PLAUSIBLE.1).contains(&hz) {
-            Ok(Self { hz, part: 1.0 })
+            Ok(Self {
+                hz,
+                slot: Slot::Unknown,
+            })
         } else {
             Err(format!(
                 "{hz} Hz is no clock of a processor: expected 1 kHz to 100 GHz, such as 168MHz"
@@ -55,27 +82,33 @@ impl Clock {
 }
 
 impl Clock {
-    /// The same for steps that have to be done in this part of the control period.
+    /// The same for steps that have to be done by then.
     #[must_use]
-    pub fn within(self, part: f64) -> Self {
-        Self { part, ..self }
+    pub fn with(self, slot: Slot) -> Self {
+        Self { slot, ..self }
     }
-}
 
-impl fmt::Display for Clock {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (factor, unit) = match self.hz {
+    /// A frequency as it is written: `168 MHz`.
+    #[must_use]
+    pub fn shown(hz: f64) -> String {
+        let (factor, unit) = match hz {
             hz if hz >= 1e9 => (1e9, "GHz"),
             hz if hz >= 1e6 => (1e6, "MHz"),
             hz if hz >= 1e3 => (1e3, "kHz"),
             _ => (1.0, "Hz"),
         };
-        write!(f, "{} {unit}", self.hz / factor)
+        format!("{} {unit}", hz / factor)
+    }
+}
+
+impl fmt::Display for Clock {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&Self::shown(self.hz))
     }
 }
 
 /// Share of the period beyond which a step that is begun in its middle ends behind its end.
-const HALF: f64 = 0.5;
+pub(crate) const HALF: f64 = 0.5;
 
 /// Share of the period below which what is left is none: interrupt entry and exit, two conversions and a timer take some 100 cycles,
 /// 1 % of a period of 100 us at 100 MHz.
@@ -120,56 +153,18 @@ impl Budget {
     #[must_use]
     pub fn of(costs: &Costs, clock: Clock, period: f64) -> Option<Self> {
         let (least, most) = costs.model_cycles?;
-        let period_cycles = clock.hz * period * clock.part;
+        let period_cycles = clock.hz * period * clock.slot.part();
         let share = (least as f64 / period_cycles, most as f64 / period_cycles);
         Some(Self {
             clock_hz: clock.hz,
             period_cycles,
-            part: clock.part,
+            part: clock.slot.part(),
             share,
             fit: match share {
                 (_, most) if most <= 1.0 => Fit::Met,
                 (least, _) if least <= 1.0 => Fit::Doubtful,
                 _ => Fit::Missed,
             },
-        })
-    }
-
-    /// When the duty of a step acts, where that may be a period later than one thinks; `None` where it fits into half of the period.
-    #[must_use]
-    pub fn lateness(&self, observers: &[Observer]) -> Option<String> {
-        // what fits behind the sample acts from the next start on, as the training had it
-        if !is_whole(&self.part) {
-            return None;
-        }
-        let most = self.share.1;
-        let counts_on_it = !observers.is_empty() && observers.iter().all(|observer| observer.compute_delay == 1);
-        if self.fit != Fit::Missed && most > HALF && counts_on_it {
-            return Some(format!(
-                "  note: a step takes up to {:.0} % of the period. The contract counts on a duty that acts one period later \
-                 (compute_delay = 1): let the timer take it over at the start of the next period, never earlier",
-                100.0 * most
-            ));
-        }
-        let and_there = match observers {
-            [] => "",
-            _ => ", and compute_delay = 1 in the contract",
-        };
-        // what is left in whole percent, or there is no instant to be named
-        (self.fit != Fit::Missed && most > HALF).then(|| match most < 0.99 {
-            true => format!(
-                "  note: a step takes up to {:.0} % of the period. Sampled within the first {:.0} % of it, the duty acts from the next start on; \
-                 later, it can miss that start and act one period later, and the training has to have had that: pwm.duty_delay = 1 in the \
-                 plant file{and_there}. No timer does what a training had whose duty acted at the instant of the sample: that is one to repeat, too",
-                100.0 * most,
-                100.0 * (1.0 - most)
-            ),
-            false => format!(
-                "  note: a step takes up to {:.0} % of the period, and one that takes more than 100 % is late in every period, which no training \
-                 mends. One that takes less has a duty that acts one period later, and the training has to have had that: pwm.duty_delay = 1 in the \
-                 plant file{and_there}",
-                100.0 * most
-            ),
         })
     }
 
@@ -187,10 +182,7 @@ impl Budget {
     pub fn text(&self, build: &str) -> String {
         let (least, most) = (100.0 * self.share.0, 100.0 * self.share.1);
         let period = grouped(self.period_cycles as u64);
-        let clock = Clock {
-            hz: self.clock_hz,
-            part: self.part,
-        };
+        let clock = Clock::shown(self.clock_hz);
         let is_whole = is_whole(&self.part);
         let what = match is_whole {
             true => "control period".to_owned(),
@@ -231,6 +223,13 @@ impl Budget {
 mod tests {
     use super::*;
 
+    fn at(hz: f64) -> Clock {
+        Clock {
+            hz,
+            slot: Slot::Unknown,
+        }
+    }
+
     #[test]
     fn clocks_are_read_with_their_unit() {
         for (text, hz) in [
@@ -240,7 +239,7 @@ mod tests {
             ("32768Hz", 32_768.0),
             (" 8000kHz ", 8e6),
         ] {
-            assert_eq!(Clock::parse(text), Ok(Clock { hz, part: 1.0 }), "{text}");
+            assert_eq!(Clock::parse(text), Ok(at(hz)), "{text}");
         }
         for text in [
             "168",
@@ -256,7 +255,7 @@ mod tests {
         ] {
             assert!(Clock::parse(text).is_err(), "{text}");
         }
-        assert_eq!(Clock { hz: 168e6, part: 1.0 }.to_string(), "168 MHz");
+        assert_eq!(at(168e6).to_string(), "168 MHz");
     }
 
     #[test]
@@ -273,33 +272,14 @@ mod tests {
             library_calls: Vec::new(),
         };
         // 100 us at 100 MHz are 10,000 cycles
-        let fit =
-            |cycles| Budget::of(&costs(Some(cycles)), Clock { hz: 1e8, part: 1.0 }, 1e-4).map(|budget| budget.fit);
+        let fit = |cycles| Budget::of(&costs(Some(cycles)), at(1e8), 1e-4).map(|budget| budget.fit);
         assert_eq!(fit((5_000, 9_999)), Some(Fit::Met));
         assert_eq!(fit((5_000, 10_001)), Some(Fit::Doubtful));
         assert_eq!(fit((10_001, 20_000)), Some(Fit::Missed));
-        assert_eq!(Budget::of(&costs(None), Clock { hz: 1e8, part: 1.0 }, 1e-4), None);
-        let lateness = |cycles| {
-            Budget::of(&costs(Some(cycles)), Clock { hz: 1e8, part: 1.0 }, 1e-4)
-                .unwrap()
-                .lateness(&[])
-        };
-        assert_eq!(lateness((2_000, 4_900)), None);
-        assert!(
-            lateness((2_000, 6_200))
-                .unwrap()
-                .contains("within the first 38 % of it")
-        );
-        assert!(
-            lateness((5_000, 10_001))
-                .unwrap()
-                .contains("late in every period, which no training")
-        );
-        // what does not fit at all is another matter
-        assert_eq!(lateness((10_001, 20_000)), None);
+        assert_eq!(Budget::of(&costs(None), at(1e8), 1e-4), None);
         // half of the period is NOT met where half of the fewest cycles do not fit
         let half = |cycles| {
-            let clock = Clock { hz: 1e8, part: 1.0 }.within(0.5);
+            let clock = at(1e8).with(Slot::Behind(0.5));
             Budget::of(&costs(Some(cycles)), clock, 1e-4).unwrap()
         };
         assert_eq!(half((5_001, 5_002)).fit, Fit::Missed);
@@ -309,13 +289,8 @@ mod tests {
                 .text("gcc")
                 .contains("the 50 % of the control period behind the sample: met; 50 % of that is left")
         );
-        assert_eq!(half((2_000, 4_900)).lateness(&[]), None);
         // what leaves less than interrupt entry takes leaves nothing
-        let text = |cycles| {
-            Budget::of(&costs(Some(cycles)), Clock { hz: 1e8, part: 1.0 }, 1e-4)
-                .unwrap()
-                .text("gcc")
-        };
+        let text = |cycles| Budget::of(&costs(Some(cycles)), at(1e8), 1e-4).unwrap().text("gcc");
         assert!(text((5_000, 9_950)).contains("nothing left"));
         assert!(text((5_000, 9_800)).contains("met, half of it in doubt; 2 % of the period is left"));
         assert!(text((5_100, 9_800)).contains("met, half of it NOT; 2 % of the period is left"));

@@ -157,7 +157,7 @@ fn measured(costs: &Costs, policy: &Policy, target: &TargetSpec, clock: Option<f
                 ", {:.0} to {:.0} % of the control period at {}",
                 share(least),
                 share(most),
-                Clock { hz, part: 1.0 }
+                Clock::shown(hz)
             );
         }
         lines.push(line);

@@ -15,7 +15,7 @@
 //! | who answers | [`runner`]: [`runner::Runner`] has one implementation per way of running a build |
 //! | a loop closed around a build | [`live`] |
 //! | what differs | [`compare`], [`report`]; in words: [`text`] |
-//! | what a step costs | [`mod@measure`], [`elf`]; of all builds: [`costs`]; whether it fits into its period: [`budget`], [`advice`], [`fitting`] |
+//! | what a step costs | [`mod@measure`], [`elf`]; of all builds: [`costs`]; whether it fits into its period: [`budget`], [`advice`], [`fitting`], [`lateness`] |
 //! | the files that `compile` makes | [`code`] |
 //! | archives of FMUs | [`fmu`] |
 //! | what the format does to decisions | [`decisions`] |
@@ -42,6 +42,7 @@ pub mod folder;
 mod golden;
 pub mod kit;
 pub mod lane;
+pub mod lateness;
 pub mod live;
 pub mod measure;
 pub mod oracle;

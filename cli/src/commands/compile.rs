@@ -8,7 +8,7 @@ use codegen::{Output, manifest};
 use policy::{NumericFormat, Policy};
 use serde::Serialize;
 use targets::TargetSpec;
-use verify::budget::Clock;
+use verify::budget::{Clock, Slot};
 use verify::code::{self, Code};
 use verify::costs::{Entry, StepCosts};
 use verify::fmu::Archive;
@@ -116,18 +116,18 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// The clock, with the part of the period that a policy has which is trained on `--plant`: sampled inside of the period, and with a duty that
-/// acts from the next start on, it has what is left behind the sample.
+/// The clock, with the time that a policy has which is trained on `--plant`.
 fn clock(options: &Compile, policy: &Policy) -> Result<Option<Clock>, Failure> {
     let plant = options.plant.as_ref().map(plant::Parameters::from_file).transpose()?;
-    let part = plant.map_or(1.0, |plant| {
+    let slot = plant.map_or(Slot::Unknown, |plant| {
         let phase = plant.pwm.sampling_phase;
-        match plant.pwm.duty_delay == 0 && phase > 0.0 {
-            true => ((1.0 - phase) * plant.t_sw() / policy.sample_period).min(1.0),
-            false => 1.0,
+        match plant.pwm.duty_delay {
+            0 if phase > 0.0 => Slot::Behind(((1.0 - phase) * plant.t_sw() / policy.sample_period).min(1.0)),
+            0 => Slot::AtOnce,
+            _ => Slot::Later,
         }
     });
-    Ok(options.clock.map(|clock| clock.within(part)))
+    Ok(options.clock.map(|clock| clock.with(slot)))
 }
 
 /// The page that `--report` asks for.

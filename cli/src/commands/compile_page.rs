@@ -76,10 +76,7 @@ fn verdict(shown: &Shown<'_>) -> (Verdict, &'static str, String) {
             part if part < 1.0 => "what is left of its period behind the sample",
             _ => "its period",
         },
-        Clock {
-            hz: budget.clock_hz,
-            part: budget.part
-        }
+        Clock::shown(budget.clock_hz)
     );
     let (verdict, word) = match budget.fit {
         Fit::Met => (Verdict::Pass, "fits"),

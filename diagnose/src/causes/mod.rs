@@ -257,13 +257,25 @@ mod tests {
 
     #[test]
     fn every_cause_is_documented() {
-        let page = include_str!("../../../docs/reference/diagnosis.md");
-        for cause in CAUSES {
-            assert!(
-                page.contains(&format!("`{}`", cause.id)),
-                "{} is missing in docs/reference/diagnosis.md",
-                cause.id
-            );
+        let pages = [
+            (
+                "reference/diagnosis.md",
+                include_str!("../../../docs/reference/diagnosis.md"),
+            ),
+            // what else looks like it, and how to check it at the bench
+            (
+                "how-to/plan-an-experiment.md",
+                include_str!("../../../docs/how-to/plan-an-experiment.md"),
+            ),
+        ];
+        for (name, page) in pages {
+            for cause in CAUSES {
+                assert!(
+                    page.contains(&format!("`{}`", cause.id)),
+                    "{} is missing in docs/{name}",
+                    cause.id
+                );
+            }
         }
     }
 }

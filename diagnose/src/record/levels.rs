@@ -52,7 +52,7 @@ impl Form {
             Form::Current => "load current",
             Form::Resistor => "resistor",
             Form::Power => "constant power",
-            Form::Line => "load current in straight lines",
+            Form::Line => "load current",
         }
     }
 
@@ -350,9 +350,11 @@ impl Rows {
         let mut stretches = self.stretches(cuts);
         stretches.retain(|(from, _)| !in_slopes.contains(from));
         let count = stretches.len();
-        let what = match count {
-            1 => "1 level".to_owned(),
-            count => format!("{count} levels"),
+        let what = match (form, count) {
+            (Form::Line, 1) => "1 straight line".to_owned(),
+            (Form::Line, count) => format!("{count} straight lines"),
+            (_, 1) => "1 stretch at rest".to_owned(),
+            (_, count) => format!("{count} stretches at rest"),
         };
         let level = |(from, to): &(usize, usize)| self.values[*from..*to].iter().sum::<f64>() / (to - from) as f64;
         let small = stretches
@@ -369,7 +371,7 @@ impl Rows {
             rows => format!(", with {rows} rows in the slopes between them,"),
         };
         format!(
-            "i_out is taken for a {} of {what}{between} without the noise of its meter ({}){unsure}",
+            "i_out is taken for a {} in {what}{between} without the noise of its meter ({}){unsure}",
             form.words(),
             crate::words::si(self.noise, "A")
         )
@@ -405,7 +407,7 @@ mod tests {
         let steps: Vec<usize> = (1..300).filter(|n| found.load[*n] != found.load[n - 1]).collect();
         assert_eq!(steps, [100]);
         assert!((found.load[0].current - 5.0).abs() < 0.02 && (found.load[299].current - 5.3).abs() < 0.02);
-        assert!(found.words.contains("2 levels"), "{}", found.words);
+        assert!(found.words.contains("2 stretches"), "{}", found.words);
     }
 
     #[test]

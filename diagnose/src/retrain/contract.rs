@@ -11,6 +11,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::Correction;
+use crate::extend::rounded;
 
 /// What came of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,11 +92,6 @@ pub fn corrected(text: &str, corrections: &[Correction]) -> Corrected {
         before,
         left,
     }
-}
-
-/// So many digits as a fit tells, and more.
-fn rounded(number: f64) -> f64 {
-    format!("{number:.6e}").parse().unwrap_or(number)
 }
 
 fn tables<'t, 'a>(value: Option<&'t Node<'a>>) -> impl Iterator<Item = &'t DeTable<'a>> {

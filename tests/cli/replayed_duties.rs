@@ -205,3 +205,55 @@ fn what_an_action_adds_is_held_against_the_log() {
     let (code, text) = rounded(6, [0.008, 0.0, -0.008]);
     assert_eq!(code, Some(1), "{text}");
 }
+
+/// A log of duties alone says as much as one of indices: the same choices are equal and others, and a duty that the contract does not have
+/// is told with the action that comes nearest.
+#[test]
+fn a_duty_without_an_action_says_what_was_chosen() {
+    let duties: Vec<f64> = policy::load(&tests::example())
+        .unwrap()
+        .actions()
+        .iter()
+        .map(|action| action.duty)
+        .collect();
+    let chosen = |line: usize| (line * line + line / 7) % duties.len();
+    let desk = super::replay::desk(&super::replay::environment());
+    let plain = super::replay::table(&super::replay::environment());
+    let with = |name: &str, cell: &dyn Fn(usize) -> String| -> String {
+        let lines = plain.lines().enumerate().map(|(line, text)| match line {
+            0 => format!("{text},{name}\n"),
+            line => format!("{text},{}\n", cell(line)),
+        });
+        lines.collect()
+    };
+    let counted = |text: &str| {
+        desk.write("log.csv", text);
+        let ran = desk.type_in("replay buck12 log.csv");
+        let counts = ran.stdout.lines().find(|line| line.trim_start().starts_with("action"));
+        (ran.code, counts.map(str::to_owned), ran.stdout)
+    };
+    let (code, by_index, text) = counted(&with("action", &|line| chosen(line).to_string()));
+    assert!(code == Some(1) && by_index.is_some(), "{text}");
+    let (code, by_duty, text) = counted(&with("duty", &|line| format!("{:.4}", duties[chosen(line)])));
+    assert_eq!((code, by_duty), (Some(1), by_index), "{text}");
+    assert!(text.contains("nearest to `duty`"), "{text}");
+    let (_, _, text) = counted(&with("duty", &|line| {
+        format!(
+            "{:.4}",
+            duties[chosen(line)] + if chosen(line) == 3 { 0.012 } else { 0.0 }
+        )
+    }));
+    assert!(text.contains("action 3 commands"), "{text}");
+    // behind a mapping there are as many duties as rows
+    let (code, _, text) = counted(&with("duty", &|line| format!("{:.4}", 0.4 + 1e-3 * line as f64)));
+    assert!(
+        code == Some(0) && text.contains("does not say which action was chosen"),
+        "{text}"
+    );
+    let refused = desk.type_in("replay buck12 log.csv --golden golden.safetensors");
+    assert!(
+        refused.code == Some(2) && refused.stderr.contains("the index of the choice"),
+        "{}",
+        refused.stderr
+    );
+}

@@ -290,7 +290,7 @@ fn unmodelled(
     let Some(costs) = least else { return Ok(text) };
     let instructions = costs.instructions_max;
     text += &format!(
-        ", and {} instructions in the shortest build, {}: it fits if the processor does {:.2} a cycle or more, with its wait states",
+        ", and {} instructions in the shortest build, {}: it fits if the processor does {:.2} instructions a cycle or more, with its wait states",
         grouped(instructions),
         costs.build,
         instructions as f64 / cycles
@@ -303,7 +303,32 @@ fn unmodelled(
             text += &format!("; {:.2} in {}", instructions as f64 / cycles, format.name());
         }
     }
+    if let Some(by_comparison) = relative(policy, target, outputs)? {
+        text += &by_comparison;
+    }
     Ok(text + ". A cycle counter on the board says the rest")
+}
+
+/// What a modelled processor of the same instructions makes of such code, for one who has to judge whether that is much.
+fn relative(policy: &Policy, target: &'static TargetSpec, outputs: &[Output]) -> Result<Option<String>, CodegenError> {
+    let modelled = match target.name {
+        "cortex-m33" | "cortex-m7" => targets::find("cortex-m4f"),
+        _ => None,
+    };
+    let Some(modelled) = modelled else { return Ok(None) };
+    let costs = in_format(policy, modelled, outputs)?;
+    let cycles = costs
+        .measured()
+        .filter_map(|costs| Some((costs.instructions_max, costs.model_cycles?)));
+    let soonest = cycles.min_by_key(|(_, (_, most))| *most);
+    Ok(soonest.map(|(instructions, (least, most))| {
+        let a_cycle = |cycles: u64| instructions as f64 / cycles as f64;
+        format!(
+            ". By comparison: a Cortex-M4F, whose cycles are modelled, does {:.2} to {:.2} instructions a cycle in this code, at 0 wait states",
+            a_cycle(most),
+            a_cycle(least)
+        )
+    }))
 }
 
 /// What a format takes in its fastest build.

@@ -51,6 +51,7 @@ pub fn answers(policy: &Policy, log: &Log) -> Result<Golden, Faults> {
         let message = Message::new("the log does not say what the trainer's network chose").found(log.columns());
         return Err(message
             .expected("a column `action`, of a continuous output `duty`")
+            .hint("`action` is the index of the choice, from 0; where the duties of the contract are a list, `duty` alone says it, too")
             .into());
     };
     Ok(golden(policy, log, &course, own))

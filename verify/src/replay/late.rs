@@ -66,7 +66,8 @@ fn candidates(policy: &Policy, log: &Log, found: &Replay) -> Vec<(String, Column
                 .map(|_| (previous, Column::PreviousDuty(index))),
         );
         list.extend(done.duty.as_ref().map(|_| (duty, Column::Duty(index))));
-        list.extend(done.actions.as_ref().map(|_| (action, Column::Action(index))));
+        let actions = done.actions.as_ref().filter(|_| !done.read_off);
+        list.extend(actions.map(|_| (action, Column::Action(index))));
     }
     // an observation is judged by itself, unless the duties were worked out from it
     let outputs = found.commands();
@@ -108,8 +109,12 @@ impl Log {
                 }
             }
             Column::Duty(index) => {
-                if let Some(values) = moved.done.get_mut(index).and_then(|done| done.duty.as_mut()) {
-                    shift(values, from);
+                let done = moved.done.get_mut(index);
+                if let Some(done) = done {
+                    let read_off = done.read_off;
+                    done.duty.iter_mut().for_each(|values| shift(values, from));
+                    let actions = done.actions.iter_mut().filter(|_| read_off);
+                    actions.for_each(|values| shift(values, from));
                 }
             }
             Column::PreviousDuty(index) => {

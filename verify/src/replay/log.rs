@@ -7,6 +7,7 @@ use measured::{ColumnMap, Located, Options, Quantity, Sheet, table_faults};
 use policy::{DutyPath, Policy};
 use toml_input::{Fault, Faults, Message};
 
+use super::chosen::chosen;
 use super::values::ends;
 use crate::traces::SignalColumns;
 
@@ -38,6 +39,8 @@ pub(super) struct Done {
     continuous: bool,
     /// The trainer's choice in each row.
     pub actions: Option<Vec<u32>>,
+    /// The choices were read off `duty`.
+    pub read_off: bool,
     /// What was commanded in each row, before the mapping, if the log says so.
     pub duty: Option<Vec<f64>>,
     /// The duty before each row.
@@ -110,8 +113,15 @@ impl Log {
         }
         let done = policy.paths().into_iter().zip(&names).zip(columns);
         let done = done.map(|((path, names), columns)| of_output(&path, names, columns, &sheet, &located));
-        let done = done.collect::<Result<_, _>>()?;
+        let mut done = done.collect::<Result<Vec<Done>, _>>()?;
         let mut notes = located.notes(&sheet, &[]);
+        for ((path, names), done) in policy.paths().iter().zip(&names).zip(&mut done) {
+            if let (None, Some(duties)) = (&done.actions, &done.duty) {
+                let (actions, note) = chosen(path, duties, &names[1]);
+                (done.read_off, done.actions) = (actions.is_some(), actions);
+                notes.extend(note);
+            }
+        }
         notes.extend(unread_duty(&sheet, &located, &names));
         if observed.iter().all(Option::is_none) {
             notes.extend(unread_observations(policy, &sheet, &located));
@@ -342,6 +352,7 @@ fn of_output(
     Ok(Done {
         continuous,
         actions: indices.transpose()?,
+        read_off: false,
         duty,
         previous_duty,
     })

@@ -11,6 +11,7 @@
 
 mod answers;
 mod chain;
+mod chosen;
 mod duties;
 mod explain;
 mod integral;

@@ -22,6 +22,8 @@ pub struct Chatter {
 /// Periods of the lines that are looked at.
 // a limit cycle of a sampled loop with a few duties mostly has two periods, with a delay three or four
 const LINES: [u32; 3] = [2, 3, 4];
+/// The longest of them.
+const LONGEST: usize = 4;
 /// A window that is a multiple of it holds whole periods of each line.
 const WHOLE: usize = 12;
 /// Lines below this are rounding.
@@ -79,27 +81,34 @@ fn strongest(duties: &[f64]) -> (f64, u32) {
     if duties.is_empty() {
         return none;
     }
-    let lines = LINES.map(|periods| (amplitude(duties, periods), periods));
-    let found = lines
+    let found = amplitudes(duties)
         .into_iter()
         .fold(none, |best, line| if line.0 > best.0 { line } else { best });
     if found.0 < NO_LINE { none } else { found }
 }
 
-/// Amplitude of the line of so many periods under a Hann window, by which a duty that drifts slowly leaves none.
-fn amplitude(duties: &[f64], periods: u32) -> f64 {
+/// Amplitudes of the [`LINES`] under a Hann window, by which a duty that drifts slowly leaves none.
+fn amplitudes(duties: &[f64]) -> [(f64, u32); LINES.len()] {
     let n = duties.len() as f64;
-    let (mut real, mut imaginary) = (0.0, 0.0);
+    // not `f64::cos`: that of each platform ends in other digits, and a metric is the same everywhere
+    let turn = |k: usize, periods: u32| libm::sincos(std::f64::consts::TAU * k as f64 / f64::from(periods));
+    // each sine once, not once for each duty
+    let turns = LINES.map(|periods| std::array::from_fn::<_, LONGEST, _>(|k| turn(k % periods as usize, periods)));
+    let mut sums = [[0.0; 2]; LINES.len()];
     for (k, duty) in duties.iter().enumerate() {
-        // not `f64::cos`: that of each platform ends in other digits, and a metric is the same everywhere
         let weight = 1.0 - libm::cos(std::f64::consts::TAU * k as f64 / n);
-        let (sin, cos) = libm::sincos(std::f64::consts::TAU * (k % periods as usize) as f64 / f64::from(periods));
-        real += weight * duty * cos;
-        imaginary += weight * duty * sin;
+        for (([real, imaginary], turns), periods) in sums.iter_mut().zip(&turns).zip(LINES) {
+            let (sin, cos) = turns[k % periods as usize];
+            *real += weight * duty * cos;
+            *imaginary += weight * duty * sin;
+        }
     }
-    // the weights add up to n. At half the sampling frequency both halves of the spectrum are one line
-    let halves = if periods == 2 { 1.0 } else { 2.0 };
-    halves * libm::hypot(real, imaginary) / n
+    std::array::from_fn(|line| {
+        let ([real, imaginary], periods) = (sums[line], LINES[line]);
+        // the weights add up to n. At half the sampling frequency both halves of the spectrum are one line
+        let halves = if periods == 2 { 1.0 } else { 2.0 };
+        (halves * libm::hypot(real, imaginary) / n, periods)
+    })
 }
 
 #[cfg(test)]

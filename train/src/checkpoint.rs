@@ -6,7 +6,7 @@ use toml_input::Message;
 use crate::faults::Error;
 
 /// First bytes of every checkpoint; the number changes with the order of what follows.
-const MAGIC: &[u8; 16] = b"policyc-train\0v2";
+const MAGIC: &[u8; 16] = b"policyc-train\0v3";
 const DIGEST: usize = 32;
 
 /// Writes values one behind the other, little-endian.
@@ -65,7 +65,7 @@ impl<'a> Reader<'a> {
         let Some(rest) = bytes.strip_prefix(&MAGIC[..]) else {
             return Err(match bytes.starts_with(&MAGIC[..14]) {
                 true => Message::new("checkpoint: it is of another version")
-                    .expected("version 2")
+                    .expected("version 3")
                     .hint("start the training anew"),
                 false => Message::new("checkpoint: this is not one of policyc"),
             }

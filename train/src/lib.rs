@@ -35,6 +35,7 @@ pub mod summary;
 pub mod tensorboard;
 pub mod trainer;
 mod trials;
+mod waiting;
 
 pub use closed_loop::scenario::Metrics;
 pub use closed_loop::{Converter, Environment};

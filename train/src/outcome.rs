@@ -60,6 +60,12 @@ impl<E: Environment> Trainer<E> {
     /// # Errors
     /// If there has been no look yet, the plant cannot be started or the policy does not pass its own check.
     pub fn finish(&self, ended: Ended) -> Result<Outcome, Error> {
+        if !self.waiting.is_empty() {
+            // an interrupted training: this one goes on as if nobody had asked
+            let mut settled = self.clone();
+            settled.settle()?;
+            return settled.finish(ended);
+        }
         let Some(best) = self.best() else {
             let message = Message::new("no policy has been judged yet");
             return Err(message

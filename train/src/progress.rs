@@ -37,7 +37,7 @@ pub struct Progress {
     pub seed: u64,
     /// The row of the learning curve.
     pub look: Look,
-    /// Best cost so far.
+    /// Best cost so far, of the networks whose cost is known.
     pub best: f64,
     /// Control periods of the budget.
     pub steps: u64,
@@ -72,7 +72,8 @@ pub struct Look {
     pub loss: f64,
     /// Probability of a random action now.
     pub epsilon: f64,
-    /// Cost on the selection scenarios ([`Score`]); a lower bound where it does not beat the best.
+    /// Cost on the selection scenarios ([`Score`]); a lower bound where it does not beat the best, and of a look that has just been
+    /// where it may beat it.
     pub cost: f64,
 }
 
@@ -81,6 +82,8 @@ pub struct Look {
 pub struct Best {
     /// Control periods after which it was found.
     pub step: u64,
+    /// Of the two networks of its look the second.
+    pub second: bool,
     /// How well it did.
     pub score: Score,
     /// Its network.

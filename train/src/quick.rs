@@ -38,12 +38,14 @@ struct Layer {
 pub(crate) struct Scratch {
     x: Vec<f32>,
     y: Vec<f32>,
-    /// Inputs that are not 0.
-    kept: Vec<u32>,
+    /// A bit for each input that is not 0.
+    kept: Vec<u64>,
 }
 
 /// Numbers of a vector.
 const VECTOR: usize = 16;
+/// Inputs of a word of bits.
+const WORD: usize = 64;
 
 impl Quick {
     pub fn new(network: &Network) -> Self {
@@ -86,7 +88,7 @@ impl Quick {
     pub fn q_values<'a>(&self, observation: &[f32], scratch: &'a mut Scratch) -> &'a [f32] {
         scratch.x.resize(self.widest, 0.0);
         scratch.y.resize(self.widest, 0.0);
-        scratch.kept.resize(self.widest, 0);
+        scratch.kept.resize(self.widest.div_ceil(WORD), 0);
         scratch.x[..observation.len()].copy_from_slice(observation);
         wide::widest(Run { network: self, scratch });
         let outputs = self.layers.last().map_or(0, |layer| layer.outputs);
@@ -107,13 +109,14 @@ impl wide::Work for Run<'_, '_> {
     fn run(self) {
         let Scratch { x, y, kept } = self.scratch;
         for layer in &self.network.layers {
-            let mut count = 0;
-            for (n, x) in x[..layer.inputs].iter().enumerate() {
-                // without a branch, which nobody could predict
-                kept[count] = n as u32;
-                count += usize::from(!self.network.skips || *x != 0.0);
+            let inputs = &x[..layer.inputs];
+            for (word, inputs) in kept.iter_mut().zip(inputs.chunks(WORD)) {
+                *word = match self.network.skips {
+                    true => not_zero(inputs),
+                    false => u64::MAX >> (WORD - inputs.len()),
+                };
             }
-            let kept = &kept[..count];
+            let kept = &kept[..layer.inputs.div_ceil(WORD)];
             let mut at = 0;
             while at < layer.width {
                 at += match layer.width - at {
@@ -131,22 +134,45 @@ impl wide::Work for Run<'_, '_> {
 impl Layer {
     /// `N` sums from output `at` on; returns how many.
     #[inline(always)]
-    fn sum<const N: usize>(&self, x: &[f32], kept: &[u32], y: &mut [f32], at: usize) -> usize {
+    fn sum<const N: usize>(&self, x: &[f32], kept: &[u64], y: &mut [f32], at: usize) -> usize {
         let (Some(bias), Some(y)) = (self.bias[at..].first_chunk::<N>(), y[at..].first_chunk_mut::<N>()) else {
             return N;
         };
         let mut sums = *bias;
-        for &n in kept {
-            let n = n as usize;
-            if let Some(row) = self.weights[n * self.width + at..].first_chunk::<N>() {
-                for (sum, &w) in sums.iter_mut().zip(row) {
-                    *sum += w * x[n];
+        for (word, &kept) in kept.iter().enumerate() {
+            let mut left = kept;
+            while left != 0 {
+                let n = word * WORD + left.trailing_zeros() as usize;
+                left &= left - 1;
+                if let Some(row) = self.weights[n * self.width + at..].first_chunk::<N>() {
+                    for (sum, &w) in sums.iter_mut().zip(row) {
+                        *sum += w * x[n];
+                    }
                 }
             }
         }
         *y = sums;
         N
     }
+}
+
+/// A bit for each of up to [`WORD`] numbers that is not 0.
+#[inline(always)]
+fn not_zero(x: &[f32]) -> u64 {
+    // vector by vector: a list of indices, one after the other, took as long as the sums
+    let mut bits = 0;
+    let (vectors, rest) = x.as_chunks::<VECTOR>();
+    for (at, vector) in vectors.iter().enumerate() {
+        let mut of_vector = 0;
+        for (n, x) in vector.iter().enumerate() {
+            of_vector |= u32::from(*x != 0.0) << n;
+        }
+        bits |= u64::from(of_vector) << (at * VECTOR);
+    }
+    for (n, x) in rest.iter().enumerate() {
+        bits |= u64::from(*x != 0.0) << (vectors.len() * VECTOR + n);
+    }
+    bits
 }
 
 #[cfg(test)]

@@ -7,9 +7,11 @@ use sha2::{Digest, Sha256};
 
 use crate::checkpoint::{Reader, Writer, other};
 use crate::faults::Error;
+use crate::network::Network;
 use crate::score::Score;
 use crate::trainer::{Best, Look, Sums, Trainer};
 use crate::trials::Told;
+use crate::waiting::Waiting;
 use closed_loop::environment::Environment;
 
 impl<E: Environment> Trainer<E> {
@@ -59,12 +61,18 @@ impl<E: Environment> Trainer<E> {
         }
         to.u64(u64::from(self.best.is_some()));
         if let Some(best) = &self.best {
-            to.words(&[best.step, u64::from(best.score.met)]);
+            to.words(&[best.step, u64::from(best.second), u64::from(best.score.met)]);
             to.f64(best.score.cost);
             to.floats(&best.network.parameters);
         }
         to.u64(self.told.0.len() as u64);
         to.numbers(&self.told.0);
+        to.u64(self.waiting.len() as u64);
+        for one in &self.waiting {
+            to.words(&[one.step, u64::from(one.second)]);
+            to.numbers(&[one.bound, one.beside]);
+            to.floats(&one.network.parameters);
+        }
         Ok(to.finish())
     }
 
@@ -142,13 +150,15 @@ impl<E: Environment> Trainer<E> {
         }
         self.best = None;
         if from.u64()? != 0 {
-            let step = from.u64()?;
+            let (step, second) = (from.u64()?, from.u64()? != 0);
             let met = from.u64()? != 0;
             let score = Score { met, cost: from.f64()? };
-            // for its shape; the parameters follow
-            let mut network = self.learner.online.clone();
-            from.floats_into(&mut network.parameters)?;
-            self.best = Some(Best { step, score, network });
+            self.best = Some(Best {
+                step,
+                second,
+                score,
+                network: self.read_network(from)?,
+            });
         }
         let count = from.count()?;
         // before so many are read: the trials are those of the training file
@@ -156,7 +166,24 @@ impl<E: Environment> Trainer<E> {
             return Err(other());
         }
         self.told = Told((0..count).map(|_| from.f64()).collect::<Result<_, _>>()?);
+        self.waiting.clear();
+        for _ in 0..from.count()? {
+            self.waiting.push(Waiting {
+                step: from.u64()?,
+                second: from.u64()? != 0,
+                bound: from.f64()?,
+                beside: from.f64()?,
+                network: self.read_network(from)?,
+            });
+        }
         Ok(())
+    }
+
+    fn read_network(&self, from: &mut Reader<'_>) -> Result<Network, Error> {
+        // for its shape
+        let mut network = self.learner.online.clone();
+        from.floats_into(&mut network.parameters)?;
+        Ok(network)
     }
 
     /// Digest of training file, contract and plant.

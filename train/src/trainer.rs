@@ -26,6 +26,7 @@ pub use crate::progress::{Best, Ended, Look, Progress};
 use crate::replay::ReplayBuffer;
 use crate::settings::Settings;
 use crate::trials::Told;
+use crate::waiting::Waiting;
 use closed_loop::Agent;
 use closed_loop::environment::{Environment, LoadPath, Start};
 
@@ -59,6 +60,7 @@ pub struct Trainer<E> {
     pub(crate) best: Option<Best>,
     pub(crate) met: bool,
     pub(crate) told: Told,
+    pub(crate) waiting: Vec<Waiting>,
     before: Vec<f32>,
     scratch: [Vec<f32>; 2],
     /// When and at which control period this program began with it; not part of a checkpoint.
@@ -96,6 +98,7 @@ impl<E: Environment> Trainer<E> {
             best: None,
             met: false,
             told: Told::new(0),
+            waiting: Vec::new(),
             before: Vec::new(),
             scratch: [Vec::new(), Vec::new()],
             started: None,
@@ -113,10 +116,14 @@ impl<E: Environment> Trainer<E> {
             return Ok(());
         };
         let mut told = self.told.clone();
-        let score = self.judge(&network, &mut told)?;
+        let mut judging = self.judging(&network)?;
+        judging.advance(f64::INFINITY, usize::MAX, &mut told)?;
+        let score = judging.bound;
+        drop(judging);
         self.told = told;
         self.best = Some(Best {
             step: 0,
+            second: false,
             score,
             network,
         });
@@ -148,7 +155,8 @@ impl<E: Environment> Trainer<E> {
     }
 
     /// The policy that did best so far; nothing before the first look, unless there is a law to add to: then a network that adds
-    /// nothing to it, after 0 control periods.
+    /// nothing to it, after 0 control periods. Of a training that was interrupted a later one may have done better, which
+    /// [`Trainer::finish`] finds out.
     #[must_use]
     pub fn best(&self) -> Option<&Best> {
         self.best.as_ref()
@@ -195,6 +203,7 @@ impl<E: Environment> Trainer<E> {
                 });
             }
         }
+        self.settle()?;
         Ok(if self.met { Ended::Met } else { Ended::Budget })
     }
 
@@ -283,23 +292,10 @@ impl<E: Environment> Trainer<E> {
     /// Judges two candidates on the selection scenarios: the network that acts and, with a soft update, the target network,
     /// its running mean, in which the noise of single updates has averaged out. Keeps the best of all looks.
     fn look(&mut self) -> Result<(), Error> {
-        let mut cost = f64::INFINITY;
         let soft = matches!(self.settings.learning.learner.target_update, TargetUpdate::Soft { .. });
-        let networks = [Some(&self.learner.online), soft.then_some(&self.learner.target_network)];
-        let mut told = self.told.clone();
-        for network in networks.into_iter().flatten() {
-            let score = self.judge(network, &mut told)?;
-            cost = cost.min(score.cost);
-            if self.best.as_ref().is_none_or(|best| score.cost < best.score.cost) {
-                self.best = Some(Best {
-                    step: self.step,
-                    score,
-                    network: network.clone(),
-                });
-                self.met = score.met && self.settings.early_stop;
-            }
-        }
-        self.told = told;
+        let mut networks = vec![self.learner.online.clone()];
+        networks.extend(soft.then(|| self.learner.target_network.clone()));
+        let cost = self.consider(&networks)?;
         let per = |sum: f64, count: u64| sum / count.max(1) as f64;
         let sums = std::mem::take(&mut self.sums);
         self.curve.push(Look {
@@ -310,7 +306,7 @@ impl<E: Environment> Trainer<E> {
             epsilon: self.settings.learning.epsilon(self.step),
             cost,
         });
-        Ok(())
+        self.conclude()
     }
 }
 

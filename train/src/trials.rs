@@ -6,21 +6,24 @@
 //!         └───────────── what raised the bound comes first in the next look ◄──────────────┘
 //! ```
 //!
+//! A network that is not ruled out after some trials, and surely misses a limit, is put off (`waiting.rs`).
+//!
 //! Invariant: the bound only grows and ends as the cost, to the bit, whatever the order. So the order decides how long a look
 //! takes and how large the bound is that it ends with, and not which network is kept.
 
 use closed_loop::LoadStep;
 use closed_loop::environment::{Environment, Varied};
-use closed_loop::scenario::{Finding, Lead, Metrics};
+use closed_loop::scenario::{Finding, Instant, Lead, Metrics, Task};
+use plant::Sample;
 
 use crate::faults::Error;
-use crate::judge::quick_controller;
+use crate::judge::{Place, quick_controller};
 use crate::network::Network;
 use crate::score::{Score, Scoring};
 use crate::trainer::Trainer;
 
 /// How much each trial told in the looks so far, as a share of the cost that rules a network out.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Told(pub Vec<f64>);
 
 /// What a look leaves of what the looks before it said of a trial.
@@ -35,11 +38,23 @@ impl Told {
         Self(vec![0.0; count])
     }
 
-    /// The trials, the most telling first; of equal ones one instant of each load step before the next instant.
-    fn order(&self) -> Vec<usize> {
-        let mut order: Vec<usize> = (0..self.0.len()).collect();
-        order.sort_by(|&a, &b| self.0[b].total_cmp(&self.0[a]));
-        order
+    /// Takes the trial out of `left` that tells most for what it takes; of equal ones the first, so that one instant of each load
+    /// step comes before the next instant. `takes` gives what one takes, at least 1.
+    fn next(&self, left: &mut Vec<usize>, takes: impl Fn(usize) -> f64) -> Option<usize> {
+        let worth = |trial: usize| match self.0[trial] {
+            // what told nothing stays behind, however little it takes
+            told if told > 0.0 => told / takes(trial),
+            told => told,
+        };
+        let mut best: Option<(usize, f64)> = None;
+        for (at, trial) in left.iter().enumerate() {
+            let worth = worth(*trial);
+            if best.is_none_or(|(_, most)| worth > most) {
+                best = Some((at, worth));
+            }
+        }
+        // in order: the first of equal ones is to stay the first
+        best.map(|(at, _)| left.remove(at))
     }
 
     /// Takes in by which share of the cost a trial raised the bound.
@@ -55,6 +70,17 @@ impl Told {
 struct Standing<'a> {
     scoring: Scoring<'a>,
     findings: Vec<Finding>,
+}
+
+/// How much of the trials a network was run through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Seen {
+    /// All of them: the score is that of the network.
+    All,
+    /// As many as rule it out.
+    Enough,
+    /// A few, which did not rule it out.
+    Some,
 }
 
 /// The score of all converters together from what is known so far: a lower bound of the cost.
@@ -76,71 +102,134 @@ impl<E: Environment> Trainer<E> {
         (1 + self.settings.spread.len()) * task.load_steps.len() * task.all_instants().len()
     }
 
-    /// The score of a network on the selection scenarios. One that cannot be better than the best is not run through the rest,
-    /// and its cost is a lower bound.
-    pub(crate) fn judge(&self, network: &Network, told: &mut Told) -> Result<Score, Error> {
-        let (selection, v_ref) = (&self.settings.selection, self.settings.reward.v_ref);
+    /// A look at a network that has seen nothing of it yet.
+    pub(crate) fn judging(&self, network: &Network) -> Result<Judging<'_, E, impl Control + use<E>>, Error> {
+        let (selection, places) = (&self.settings.selection, self.places());
         let task = &selection.task;
         let steps: Vec<LoadStep> = task.load_steps.iter().map(|&step| step.into()).collect();
-        let controller = quick_controller(&self.contract, network)?;
-        let best = self.best.as_ref().map_or(f64::INFINITY, |best| best.score.cost);
+        let mut standings = Vec::new();
+        for place in &places {
+            standings.push(Standing {
+                scoring: Scoring::new(&task.load_steps, place.specification, selection.margin),
+                findings: steps.iter().map(|step| Finding::new(*step)).collect(),
+            });
+        }
+        Ok(Judging {
+            task,
+            v_ref: self.settings.reward.v_ref,
+            controller: quick_controller(&self.contract, network)?,
+            bound: so_far(&standings),
+            standings,
+            instants: task.all_instants(),
+            known: Vec::new(),
+            leads: Vec::new(),
+            left: (0..self.trial_count()).collect(),
+            steps,
+            places,
+        })
+    }
+}
+
+/// A controller that can be copied in mid-run.
+pub(crate) trait Control: FnMut(&Sample) -> f64 + Clone {}
+impl<C: FnMut(&Sample) -> f64 + Clone> Control for C {}
+
+/// A look in mid-work.
+pub(crate) struct Judging<'a, E, C> {
+    task: &'a Task,
+    v_ref: f64,
+    controller: C,
+    steps: Vec<LoadStep>,
+    instants: Vec<Instant>,
+    places: Vec<Place<'a, E>>,
+    standings: Vec<Standing<'a>>,
+    /// Place and load of each lead: steps from the same load have one.
+    known: Vec<(usize, f64)>,
+    leads: Vec<Lead<'a, Varied<E>, C>>,
+    /// Trials that have not been run.
+    left: Vec<usize>,
+    /// The score of what has been seen: a lower bound of the cost.
+    pub bound: Score,
+}
+
+impl<E: Environment, C: Control> Judging<'_, E, C> {
+    /// Trials that show each load step once, where nothing is known of them.
+    pub fn few(&self) -> usize {
+        self.steps.len() * self.places.len()
+    }
+
+    /// Runs so many trials more, or as few as show that the cost does not stay below `bar`.
+    pub fn advance(&mut self, bar: f64, count: usize, told: &mut Told) -> Result<Seen, Error> {
         // of the first network that is judged: the cost of one that just holds
-        let whole = if best.is_finite() {
-            best.max(f64::MIN_POSITIVE)
+        let whole = if bar.is_finite() {
+            bar.max(f64::MIN_POSITIVE)
         } else {
             1.0
         };
-        let (instants, places) = (task.all_instants(), self.places());
-        let mut standings: Vec<Standing<'_>> = places
-            .iter()
-            .map(|place| Standing {
-                scoring: Scoring::new(&task.load_steps, place.specification, selection.margin),
-                findings: steps.iter().map(|step| Finding::new(*step)).collect(),
-            })
-            .collect();
-        // steps from the same load have one lead
-        let mut known: Vec<(usize, f64)> = Vec::new();
-        let mut leads: Vec<Lead<'_, Varied<E>, _>> = Vec::new();
-        let mut bound = so_far(&standings);
-        for trial in told.order() {
-            let (step_at, place_at) = (trial % steps.len(), trial / steps.len() % places.len());
-            let instant = instants[trial / (steps.len() * places.len())];
-            let step = steps[step_at];
-            let key = (place_at, step.values[0]);
-            let lead = match known.iter().position(|other| *other == key) {
-                Some(at) => at,
-                None => {
-                    let converter = &places[place_at].converter;
-                    leads.push(Lead::new(converter, &controller, v_ref, task, &step)?);
-                    known.push(key);
-                    leads.len() - 1
-                }
+        let with_lead = 1.0 + self.task.lead as f64 / self.task.after.max(1) as f64;
+        for _ in 0..count {
+            let mut left = std::mem::take(&mut self.left);
+            let takes = |trial| match self.known.contains(&self.lead_of(trial)) {
+                true => 1.0,
+                false => with_lead,
             };
-            let before = standings[place_at].findings[step_at];
-            let mut bound_with = |metrics: &Metrics| {
-                standings[place_at].findings[step_at] = before;
-                standings[place_at].findings[step_at].add(instant, *metrics);
-                so_far(&standings)
-            };
-            let mut asked = Metrics::default();
-            let metrics = leads[lead].run(&step, instant, |metrics| {
-                // most periods change nothing, and the bound of all load steps costs as much as some of them
-                let grown = metrics.deviation > asked.deviation
-                    || metrics.settling > asked.settling
-                    || metrics.tail_max > asked.tail_max;
-                asked = *metrics;
-                !grown || bound_with(metrics).cost < best
-            })?;
-            let with = bound_with(&metrics);
-            told.learn(trial, (with.cost - bound.cost) / whole);
-            bound = with;
-            if bound.cost >= best {
-                // cut short, so nothing can be said of the rest
-                bound.met = false;
-                break;
+            let next = told.next(&mut left, takes);
+            self.left = left;
+            let Some(trial) = next else { break };
+            let before = self.bound.cost;
+            self.run(trial, bar)?;
+            told.learn(trial, (self.bound.cost - before) / whole);
+            if self.bound.cost >= bar {
+                return Ok(Seen::Enough);
             }
         }
-        Ok(bound)
+        Ok(if self.left.is_empty() { Seen::All } else { Seen::Some })
+    }
+
+    /// Load step, place and instant of a trial.
+    fn of(&self, trial: usize) -> (usize, usize, Instant) {
+        let step = trial % self.steps.len();
+        let place = trial / self.steps.len() % self.places.len();
+        (step, place, self.instants[trial / self.few()])
+    }
+
+    fn lead_of(&self, trial: usize) -> (usize, f64) {
+        let (step, place, _) = self.of(trial);
+        (place, self.steps[step].values[0])
+    }
+
+    /// Runs a trial, up to where the cost does not stay below `bar`.
+    fn run(&mut self, trial: usize, bar: f64) -> Result<(), Error> {
+        let (step_at, place_at, instant) = self.of(trial);
+        let (step, key) = (self.steps[step_at], self.lead_of(trial));
+        let lead = match self.known.iter().position(|other| *other == key) {
+            Some(at) => at,
+            None => {
+                let converter = &self.places[place_at].converter;
+                let lead = Lead::new(converter, &self.controller, self.v_ref, self.task, &step)?;
+                self.leads.push(lead);
+                self.known.push(key);
+                self.leads.len() - 1
+            }
+        };
+        let standings = &mut self.standings;
+        let before = standings[place_at].findings[step_at];
+        let mut bound_with = |metrics: &Metrics| {
+            standings[place_at].findings[step_at] = before;
+            standings[place_at].findings[step_at].add(instant, *metrics);
+            so_far(standings)
+        };
+        let mut asked = Metrics::default();
+        let metrics = self.leads[lead].run(&step, instant, |metrics| {
+            // most periods change nothing, and the bound of all load steps costs as much as some of them
+            let grown = metrics.deviation > asked.deviation
+                || metrics.settling > asked.settling
+                || metrics.tail_max > asked.tail_max;
+            asked = *metrics;
+            !grown || bound_with(metrics).cost < bar
+        })?;
+        self.bound = bound_with(&metrics);
+        Ok(())
     }
 }
 
@@ -149,11 +238,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_told_most_comes_first_and_what_told_nothing_last() {
-        let mut told = Told::new(4);
-        for (trial, share) in [(2, 0.5), (1, f64::INFINITY), (0, 0.0)] {
+    fn what_told_most_for_what_it_takes_comes_first_and_what_told_nothing_last() {
+        let mut told = Told::new(5);
+        for (trial, share) in [(2, 0.5), (1, f64::INFINITY), (0, 0.0), (4, 0.7)] {
             told.learn(trial, share);
         }
-        assert_eq!(told.order(), [1, 2, 3, 0]);
+        let order = |takes: &dyn Fn(usize) -> f64| {
+            let mut left: Vec<usize> = (0..5).collect();
+            let next = |_| told.next(&mut left, takes);
+            (0..5).filter_map(next).collect::<Vec<_>>()
+        };
+        assert_eq!(order(&|_| 1.0), [1, 4, 2, 3, 0]);
+        assert_eq!(order(&|trial| if trial == 4 { 2.0 } else { 1.0 }), [1, 2, 4, 3, 0]);
     }
 }

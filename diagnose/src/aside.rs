@@ -11,6 +11,7 @@
 //! Invariant: a cause found so has passed all that a cause has to pass, and more: it is far above the threshold, and what was set aside
 //! does not speak against it.
 
+use crate::attribute::SURE;
 use crate::doubts::Doubt;
 use crate::drive::Model;
 use crate::examine::{Examined, examined};
@@ -36,8 +37,6 @@ const FEWEST_ROWS: usize = 50;
 const FEWEST_CHANNELS: usize = 2;
 /// Fewest records that are left, so that not a single run decides.
 const FEWEST_RECORDS: usize = 2;
-/// Evidence over its threshold: twice as many standard deviations as for a cause that explains all of the records.
-const SURE: f64 = 4.0;
 /// The causes may make what was set aside this much worse, in squares, since what disturbs it may run against them: an effect and a
 /// disturbance of one size that follow each other to .6 do so by 1.25. A convention above it.
 const WORSE: f64 = 1.5;

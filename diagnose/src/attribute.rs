@@ -3,6 +3,7 @@
 
 use crate::basis::Basis;
 use crate::causes::{Candidate, candidates};
+use crate::coloured;
 use crate::fit::{FINE, Fit, Fitter, ROUGH, State};
 use crate::instants;
 use crate::level::threshold;
@@ -19,6 +20,9 @@ use crate::unseen::is_there;
 /// Causes that are fitted with free instants from where they fit without. As many as are fitted after a linear look in the search: a
 /// convention.
 const LEADERS: usize = 5;
+
+/// Evidence over its threshold where something is in the records that no cause makes: twice as many standard deviations.
+pub const SURE: f64 = 4.0;
 
 /// What was found.
 #[derive(Debug, Clone)]
@@ -227,6 +231,28 @@ impl Attribution {
         };
         let out: Vec<usize> = (0..best.causes.len()).filter(is_nothing).collect();
         self.leave_out(problem, profiles, &out)
+    }
+
+    /// Takes out causes whose evidence is too weak for the colour of what is left, or that are a rhythm of the rows; `beside_line` if a line is there, with the model as given or
+    /// in the end. Their ids. For the time before there are profiles.
+    pub fn leave_out_coloured(&mut self, problem: &Problem, beside_line: bool) -> Vec<&'static str> {
+        let Some(best) = self.best.clone() else {
+            return Vec::new();
+        };
+        let scatter = coloured::scatter(problem, self);
+        let sure = if beside_line { SURE } else { 1.0 };
+        let is_weak = |member: &usize| {
+            let parameters = self.candidates[best.causes[*member]].own.len();
+            self.evidence[*member] < threshold(parameters, scatter[*member].max(sure * self.inflation))
+                || coloured::is_of_rows(problem, self, *member)
+        };
+        let weak: Vec<usize> = (0..best.causes.len()).filter(is_weak).collect();
+        let places = self.fitter(problem).places(&best.causes);
+        let member = |place: &(usize, usize)| best.causes.iter().position(|cause| *cause == place.0).unwrap_or(0);
+        let mut at_best: Vec<Profile> = (places.iter().zip(&best.values))
+            .map(|(place, value)| Profile::at(member(place), *value))
+            .collect();
+        self.leave_out(problem, &mut at_best, &weak)
     }
 
     /// Takes causes out, by their places, and fits the others again. Their ids.

@@ -75,6 +75,17 @@ impl Part {
         }
     }
 
+    /// Whether a place of a residual is in it.
+    fn has(self, problem: &Problem, place: usize) -> bool {
+        match self {
+            Part::Channel(n) => place < problem.rows() && place % CHANNELS == n,
+            Part::Record(index) => {
+                let from = problem.offsets[index];
+                (from..from + problem.records[index].rows() * CHANNELS).contains(&place)
+            }
+        }
+    }
+
     /// The records without it.
     fn taken_from(self, records: &[Record]) -> Vec<Record> {
         let mut rest = records.to_vec();
@@ -117,7 +128,7 @@ pub fn explained_without(
         true => spoilt_later(whole).into_iter().collect(),
         false => parts(whole),
     };
-    let work = &whole.problem.work;
+    let work = &whole.problem.work.of_part();
     // what the records look like has been said of all of them
     let say: Listener<'_> = &|what| {
         if !matches!(what, Progress::Noticed(_)) {
@@ -127,6 +138,11 @@ pub fn explained_without(
     looks.into_iter().take(LOOKS).enumerate().find_map(|(place, part)| {
         // two searches in vain that took half of the budget: a third would take the rest
         if !work.goes_on() || place > 0 && !work.half_is_left() {
+            return None;
+        }
+        let problem = &whole.problem;
+        let is_aside = |place: usize| part.has(problem, place);
+        if whole.attribution.is_out_of_reach(problem, &is_aside) {
             return None;
         }
         let mut found = examined(part.taken_from(records), base, work, say);

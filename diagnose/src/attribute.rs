@@ -2,7 +2,7 @@
 //! as well beside them.
 
 use crate::basis::Basis;
-use crate::causes::{Candidate, candidates};
+use crate::causes::{Candidate, Search, candidates};
 use crate::coloured;
 use crate::fit::{FINE, Fit, Fitter, ROUGH, State};
 use crate::instants;
@@ -67,6 +67,12 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
     // the model as given may be so far off that its instants run away: sensitivities are those of where the instants fit
     let free_basis = freed.basis(&near.model, &near.starts, &near.residual);
     let free = searcher(&freed, &candidates, &free_basis, &inside, say);
+    if free.is_out_of_reach(&near, &|_| false) {
+        // the instants take up a part of what no cause explains: beside them nothing is found either
+        let found = search.leading(&singles).map(|fit| search.backward(fit));
+        let attribution = completed(&search, singles, found.unwrap_or((None, Vec::new())));
+        return (problem, attribution);
+    }
     let mut free_singles = free.singles("load steps inside a period: each cause alone");
     for (place, fit) in search
         .leaders(&singles, LEADERS)
@@ -197,6 +203,12 @@ impl Attribution {
         }
     }
 
+    /// Whether all candidates together explain too little of the records without the places of the residual that are `aside`.
+    pub(crate) fn is_out_of_reach(&self, problem: &Problem, aside: &(dyn Fn(usize) -> bool + Sync)) -> bool {
+        let search = searcher(problem, &self.candidates, &self.basis, &self.null, &|_| ());
+        search.is_out_of_reach(self.state(), aside)
+    }
+
     /// Where the best explanation ends, or the model as given.
     #[must_use]
     pub fn state(&self) -> &State {
@@ -243,7 +255,11 @@ impl Attribution {
         let sure = if beside_line { SURE } else { 1.0 };
         let is_weak = |member: &usize| {
             let parameters = self.candidates[best.causes[*member]].own.len();
+            let form = self.candidates[best.causes[*member]].form;
+            // to which counts a duty is rounded nobody knows where the duty itself goes to and fro
+            let is_of_counts = beside_line && matches!(form.search, Search::Counter(_));
             self.evidence[*member] < threshold(parameters, scatter[*member].max(sure * self.inflation))
+                || is_of_counts
                 || coloured::is_of_rows(problem, self, *member)
         };
         let weak: Vec<usize> = (0..best.causes.len()).filter(is_weak).collect();

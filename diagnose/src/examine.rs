@@ -166,7 +166,7 @@ impl Examined {
     #[must_use]
     pub fn left(&self) -> Vec<Structure> {
         let own = || self.structure.iter().chain(&self.lines).cloned().collect();
-        if self.verdict != Verdict::Unexplained || self.attribution.best.is_none() || self.structure.is_empty() {
+        if self.verdict != Verdict::Unexplained || self.attribution.best.is_none() {
             return own();
         }
         let (problem, null) = (&self.problem, &self.attribution.null);

@@ -1,5 +1,5 @@
 //! A rhythm that the duty column does not show is no cause of the list, and lends none of them evidence: its harmonics and what it leaves behind
-//! steps are no white noise. A cause that is really there beside it is found all the same. The records are those of a circuit that shares
+//! steps are no white noise. The records are those of a circuit that shares
 //! nothing with the plant (`bench`).
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -76,16 +76,15 @@ fn power(values: &[f64], share: f64) -> f64 {
     (re * re + im * im) / values.len() as f64
 }
 
-/// A table with a rhythm of `period` rows, `height` times the noise at its frequency in the channel that shows most, of `bench` with what
-/// `changed` makes of it.
-fn rhythmic(bench: &Bench, changed: &Bench, period: usize, height: f64, random: &mut Noise) -> Table {
+/// A table with a rhythm of `period` rows, `height` times the noise at its frequency in the channel that shows most.
+fn rhythmic(bench: &Bench, period: usize, height: f64, random: &mut Noise) -> Table {
     let names = ["v_out", "i_l"];
-    let mut still = noted(changed, 0.0, 2);
+    let mut still = noted(bench, 0.0, 2);
     let sizes = [100.0, 5.0];
     let sigma = [0, 1].map(|n| NOISE[n] * sizes[n]);
     let mut size = 1e-3;
     for _ in 0..2 {
-        let mut shaken = noted(changed, size, period);
+        let mut shaken = noted(bench, size, period);
         let of = |n: usize, shaken: &mut Table, still: &mut Table| {
             let (a, b) = (shaken.column(names[n]), still.column(names[n]));
             let left: Vec<f64> = a.iter().zip(b.iter()).map(|(a, b)| (a - b) / sigma[n]).collect();
@@ -94,9 +93,8 @@ fn rhythmic(bench: &Bench, changed: &Bench, period: usize, height: f64, random: 
         let seen = f64::max(of(0, &mut shaken, &mut still), of(1, &mut shaken, &mut still));
         size *= height / seen.sqrt();
     }
-    let _ = bench;
     let columns = [("v_out", sigma[0], 1e-2), ("i_l", sigma[1], 1e-3)];
-    noted(changed, size, period).measured(&columns, random)
+    noted(bench, size, period).measured(&columns, random)
 }
 
 fn asked(bench: &Bench, table: &Table) -> Findings {
@@ -106,14 +104,14 @@ fn asked(bench: &Bench, table: &Table) -> Findings {
     diagnose(&model, vec![record], &[], &|_| ()).findings
 }
 
-/// How many of `each` tables of every period have a cause named beside their rhythm.
+/// How many tables, one for each of the `periods`, have a cause named beside their rhythm, and how many there are.
 fn named_falsely(seed: u64, periods: &[usize], heights: &[f64]) -> (usize, usize) {
     let random = &mut Noise(seed);
     let (mut named, mut all) = (0, 0);
     for (n, period) in periods.iter().enumerate() {
         let height = heights[n % heights.len()];
         let bench = drawn(random);
-        let table = rhythmic(&bench, &bench, *period, height, random);
+        let table = rhythmic(&bench, *period, height, random);
         let found = asked(&bench, &table);
         all += 1;
         named += usize::from(!found.causes.is_empty());
@@ -139,7 +137,13 @@ fn named_falsely(seed: u64, periods: &[usize], heights: &[f64]) -> (usize, usize
 }
 
 #[test]
-#[ignore = "minutes"]
+fn a_rhythm_lends_no_cause_its_evidence() {
+    let (named, all) = named_falsely(1, &[4, 7, 8, 9, 11], &[20.0, 40.0]);
+    assert_eq!(named, 0, "of {all}");
+}
+
+#[test]
+#[ignore = "a survey: minutes"]
 fn many_rhythms() {
     let seed = std::env::var("SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(1);
     let periods: Vec<usize> = (0..24).map(|n| [2, 4, 5, 6, 7, 8, 9, 10, 11, 12][n % 10]).collect();

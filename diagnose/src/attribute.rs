@@ -262,13 +262,28 @@ impl Attribution {
                 || is_of_counts
                 || coloured::is_of_rows(problem, self, *member)
         };
-        let weak: Vec<usize> = (0..best.causes.len()).filter(is_weak).collect();
+        let mut weak: Vec<usize> = (0..best.causes.len()).filter(is_weak).collect();
         let places = self.fitter(problem).places(&best.causes);
         let member = |place: &(usize, usize)| best.causes.iter().position(|cause| *cause == place.0).unwrap_or(0);
         let mut at_best: Vec<Profile> = (places.iter().zip(&best.values))
             .map(|(place, value)| Profile::at(member(place), *value))
             .collect();
-        self.leave_out(problem, &mut at_best, &weak)
+        let mut without = self.clone();
+        let out = without.leave_out(problem, &mut at_best.clone(), &weak);
+        if without.asks_for_edges() && !self.asks_for_edges() {
+            // the trim takes over what such a cause does, so that its evidence is small, and is more than edges do
+            weak.retain(|member| !self.candidates[best.causes[*member]].is_of_edges());
+            return self.leave_out(problem, &mut at_best, &weak);
+        }
+        *self = without;
+        out
+    }
+
+    /// Whether the edges of the gate do more than edges can where the best explanation ends.
+    fn asks_for_edges(&self) -> bool {
+        let state = self.state();
+        let f_sw = state.model.plant.converter.f_sw;
+        state.starts.trim_of_nobody(f_sw).is_some()
     }
 
     /// Takes causes out, by their places, and fits the others again. Their ids.

@@ -17,6 +17,8 @@ const CABLE: u64 = 10;
 // a row of the method of Runge and Kutta cost thirty and more where the filter is fast, and took nine tenths of the time of a hopeless search;
 // by a matrix it is some five
 const FILTER: u64 = 5;
+/// And with a constant power that lags, which takes the general integrator.
+const LAG: u64 = 2;
 /// What a settled point costs: it is sought over many periods.
 const SETTLED: u64 = 30;
 
@@ -56,9 +58,11 @@ impl Work {
     /// A record is simulated.
     pub(crate) fn add(&self, model: &Model, record: &Record) {
         let p = &model.plant;
+        let is_lagged = p.load.cpl_time_constant > 0.0 && record.load.iter().any(|load| load.power != 0.0);
         let of_plant = match (p.cable.inductance > 0.0, p.source.c_in > 0.0) {
             (true, _) => CABLE,
             (false, true) => FILTER,
+            (false, false) if is_lagged => LAG,
             (false, false) => 1,
         };
         let of_record = if record.settled { SETTLED } else { 1 };

@@ -14,8 +14,7 @@ const ROWS: u64 = 24_000_000;
 // 3.3 M rows a second with an ESR, .7 M behind it a cable of 50 kHz, .3 M one of 160 kHz (docs/results/plant.md)
 const CABLE: u64 = 10;
 /// And behind an input filter.
-// a row of the method of Runge and Kutta cost thirty and more where the filter is fast, and took nine tenths of the time of a hopeless search;
-// by a matrix it is some five
+// a convention between a row without and one behind a cable: the same matrix, and often fewer steps of it
 const FILTER: u64 = 5;
 /// And with a constant power that lags, which takes the general integrator.
 const LAG: u64 = 2;

@@ -11,6 +11,7 @@
 //! Invariant: a cause found so has passed all that a cause has to pass, and more: it is far above the threshold, and what was set aside
 //! does not speak against it.
 
+use crate::attribute::SURE;
 use crate::doubts::Doubt;
 use crate::drive::Model;
 use crate::examine::{Examined, examined};
@@ -36,8 +37,6 @@ const FEWEST_ROWS: usize = 50;
 const FEWEST_CHANNELS: usize = 2;
 /// Fewest records that are left, so that not a single run decides.
 const FEWEST_RECORDS: usize = 2;
-/// Evidence over its threshold: twice as many standard deviations as for a cause that explains all of the records.
-const SURE: f64 = 4.0;
 /// The causes may make what was set aside this much worse, in squares, since what disturbs it may run against them: an effect and a
 /// disturbance of one size that follow each other to .6 do so by 1.25. A convention above it.
 const WORSE: f64 = 1.5;
@@ -73,6 +72,17 @@ impl Part {
         match self {
             Part::Channel(n) => n == channel,
             Part::Record(index) => index == record,
+        }
+    }
+
+    /// Whether a place of a residual is in it.
+    fn has(self, problem: &Problem, place: usize) -> bool {
+        match self {
+            Part::Channel(n) => place < problem.rows() && place % CHANNELS == n,
+            Part::Record(index) => {
+                let from = problem.offsets[index];
+                (from..from + problem.records[index].rows() * CHANNELS).contains(&place)
+            }
         }
     }
 
@@ -118,7 +128,7 @@ pub fn explained_without(
         true => spoilt_later(whole).into_iter().collect(),
         false => parts(whole),
     };
-    let work = &whole.problem.work;
+    let work = &whole.problem.work.of_part();
     // what the records look like has been said of all of them
     let say: Listener<'_> = &|what| {
         if !matches!(what, Progress::Noticed(_)) {
@@ -128,6 +138,11 @@ pub fn explained_without(
     looks.into_iter().take(LOOKS).enumerate().find_map(|(place, part)| {
         // two searches in vain that took half of the budget: a third would take the rest
         if !work.goes_on() || place > 0 && !work.half_is_left() {
+            return None;
+        }
+        let problem = &whole.problem;
+        let is_aside = |place: usize| part.has(problem, place);
+        if whole.attribution.is_out_of_reach(problem, &is_aside) {
             return None;
         }
         let mut found = examined(part.taken_from(records), base, work, say);

@@ -2,7 +2,8 @@
 //! as well beside them.
 
 use crate::basis::Basis;
-use crate::causes::{Candidate, candidates};
+use crate::causes::{Candidate, Search, candidates};
+use crate::coloured;
 use crate::fit::{FINE, Fit, Fitter, ROUGH, State};
 use crate::instants;
 use crate::level::threshold;
@@ -19,6 +20,9 @@ use crate::unseen::is_there;
 /// Causes that are fitted with free instants from where they fit without. As many as are fitted after a linear look in the search: a
 /// convention.
 const LEADERS: usize = 5;
+
+/// Evidence over its threshold where something is in the records that no cause makes: twice as many standard deviations.
+pub const SURE: f64 = 4.0;
 
 /// What was found.
 #[derive(Debug, Clone)]
@@ -63,6 +67,12 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
     // the model as given may be so far off that its instants run away: sensitivities are those of where the instants fit
     let free_basis = freed.basis(&near.model, &near.starts, &near.residual);
     let free = searcher(&freed, &candidates, &free_basis, &inside, say);
+    if free.is_out_of_reach(&near, &|_| false) {
+        // the instants take up a part of what no cause explains: beside them nothing is found either
+        let found = search.leading(&singles).map(|fit| search.backward(fit));
+        let attribution = completed(&search, singles, found.unwrap_or((None, Vec::new())));
+        return (problem, attribution);
+    }
     let mut free_singles = free.singles("load steps inside a period: each cause alone");
     for (place, fit) in search
         .leaders(&singles, LEADERS)
@@ -193,6 +203,12 @@ impl Attribution {
         }
     }
 
+    /// Whether all candidates together explain too little of the records without the places of the residual that are `aside`.
+    pub(crate) fn is_out_of_reach(&self, problem: &Problem, aside: &(dyn Fn(usize) -> bool + Sync)) -> bool {
+        let search = searcher(problem, &self.candidates, &self.basis, &self.null, &|_| ());
+        search.is_out_of_reach(self.state(), aside)
+    }
+
     /// Where the best explanation ends, or the model as given.
     #[must_use]
     pub fn state(&self) -> &State {
@@ -227,6 +243,47 @@ impl Attribution {
         };
         let out: Vec<usize> = (0..best.causes.len()).filter(is_nothing).collect();
         self.leave_out(problem, profiles, &out)
+    }
+
+    /// Takes out causes whose evidence is too weak for the colour of what is left, or that are a rhythm of the rows; `beside_line` if a line is there, with the model as given or
+    /// in the end. Their ids. For the time before there are profiles.
+    pub fn leave_out_coloured(&mut self, problem: &Problem, beside_line: bool) -> Vec<&'static str> {
+        let Some(best) = self.best.clone() else {
+            return Vec::new();
+        };
+        let scatter = coloured::scatter(problem, self);
+        let sure = if beside_line { SURE } else { 1.0 };
+        let is_weak = |member: &usize| {
+            let parameters = self.candidates[best.causes[*member]].own.len();
+            let form = self.candidates[best.causes[*member]].form;
+            // to which counts a duty is rounded nobody knows where the duty itself goes to and fro
+            let is_of_counts = beside_line && matches!(form.search, Search::Counter(_));
+            self.evidence[*member] < threshold(parameters, scatter[*member].max(sure * self.inflation))
+                || is_of_counts
+                || coloured::is_of_rows(problem, self, *member)
+        };
+        let mut weak: Vec<usize> = (0..best.causes.len()).filter(is_weak).collect();
+        let places = self.fitter(problem).places(&best.causes);
+        let member = |place: &(usize, usize)| best.causes.iter().position(|cause| *cause == place.0).unwrap_or(0);
+        let mut at_best: Vec<Profile> = (places.iter().zip(&best.values))
+            .map(|(place, value)| Profile::at(member(place), *value))
+            .collect();
+        let mut without = self.clone();
+        let out = without.leave_out(problem, &mut at_best.clone(), &weak);
+        if without.asks_for_edges() && !self.asks_for_edges() {
+            // the trim takes over what such a cause does, so that its evidence is small, and is more than edges do
+            weak.retain(|member| !self.candidates[best.causes[*member]].is_of_edges());
+            return self.leave_out(problem, &mut at_best, &weak);
+        }
+        *self = without;
+        out
+    }
+
+    /// Whether the edges of the gate do more than edges can where the best explanation ends.
+    fn asks_for_edges(&self) -> bool {
+        let state = self.state();
+        let f_sw = state.model.plant.converter.f_sw;
+        state.starts.trim_of_nobody(f_sw).is_some()
     }
 
     /// Takes causes out, by their places, and fits the others again. Their ids.

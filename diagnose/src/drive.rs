@@ -145,6 +145,10 @@ pub fn simulate(model: &Model, record: &Record, begin: &Begin<'_>) -> Vec<[f64; 
             .zip(begin.late.iter().copied())
             .collect(),
     };
+    // without constant power its lag is a state that stands still at 0, and beside it the circuit cannot be taken in its two states alone
+    if driver.load.iter().all(|load| load.power == 0.0) {
+        p.load.cpl_time_constant = 0.0;
+    }
     for (segment, start) in record.segments.iter().zip(begin.states) {
         if p.source.ripple > 0.0 {
             // the plant's time starts at 0 with each segment, the line's phase does not

@@ -76,6 +76,11 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
         None => {}
     }
     let (mut problem, mut attribution) = attribute(problem, null, say);
+    let is_line = |state| !fast::structures(&problem, &attribution.null, state).is_empty();
+    let beside_line = is_line(&attribution.null) || is_line(attribution.state());
+    odd.extend((attribution.leave_out_coloured(&problem, beside_line)).into_iter().map(|id| {
+        format!("{id} would fit a little better: not named, since a rhythm, or other noise that is not white, lends it as much")
+    }));
     instants::note(&mut problem, &attribution.state().starts);
     unsure_levels::note(&mut problem, attribution.state());
     // what is too small for a cause still leaves no structure
@@ -161,7 +166,7 @@ impl Examined {
     #[must_use]
     pub fn left(&self) -> Vec<Structure> {
         let own = || self.structure.iter().chain(&self.lines).cloned().collect();
-        if self.verdict != Verdict::Unexplained || self.attribution.best.is_none() || self.structure.is_empty() {
+        if self.verdict != Verdict::Unexplained || self.attribution.best.is_none() {
             return own();
         }
         let (problem, null) = (&self.problem, &self.attribution.null);

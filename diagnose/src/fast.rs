@@ -346,7 +346,7 @@ fn periodogram(values: &[f64], known: usize) -> Vec<f64> {
 }
 
 /// Fourier transform of a power of two, in place (Cooley and Tukey).
-fn transform(re: &mut [f64], im: &mut [f64]) {
+pub(crate) fn transform(re: &mut [f64], im: &mut [f64]) {
     let n = re.len();
     let bits = n.trailing_zeros();
     for at in 0..n {

@@ -25,6 +25,7 @@ pub mod basis;
 pub mod beside;
 pub mod capture;
 pub mod causes;
+mod coloured;
 pub mod compared;
 pub mod control;
 pub mod diagnosis;

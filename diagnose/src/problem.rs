@@ -198,7 +198,7 @@ impl Problem {
     }
 
     /// Length of the part that holds rows of records.
-    fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         self.records.iter().map(|record| record.rows() * CHANNELS).sum()
     }
 

@@ -42,6 +42,20 @@ pub struct Profile {
 }
 
 impl Profile {
+    /// Of a parameter of which only the value is known as yet.
+    #[must_use]
+    pub(crate) fn at(member: usize, value: f64) -> Self {
+        Profile {
+            member,
+            name: "",
+            unit: "",
+            value,
+            interval: [value, value],
+            own: value,
+            curve: Vec::new(),
+        }
+    }
+
     /// Whether the model's own value lies in the interval.
     #[must_use]
     pub fn holds_own(&self) -> bool {

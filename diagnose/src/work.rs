@@ -13,12 +13,29 @@ const ROWS: u64 = 24_000_000;
 /// What a row costs with a load cable, in rows without.
 // 3.3 M rows a second with an ESR, .7 M behind it a cable of 50 kHz, .3 M one of 160 kHz (docs/results/plant.md)
 const CABLE: u64 = 10;
+/// And behind an input filter.
+// a convention between a row without and one behind a cable: the same matrix, and often fewer steps of it
+const FILTER: u64 = 5;
+/// And with a constant power that lags, which takes the general integrator.
+const LAG: u64 = 2;
 /// What a settled point costs: it is sought over many periods.
 const SETTLED: u64 = 30;
 
-/// What all searches of a diagnosis have computed together.
-#[derive(Debug, Clone, Default)]
-pub struct Work(Arc<Counts>);
+/// Most causes that a search may name. Records of one converter hold 5 to 15 independent directions; blind cases hide at most two effects, and the
+/// third place is for one that a second imitates in part.
+const MOST: usize = 3;
+/// And where a part of the records is set aside: a third cause beside a disturbance was never there, and is half of the time of such a search.
+const MOST_BESIDE: usize = 2;
+
+/// What all searches of a diagnosis have computed together, and how many causes this one may name.
+#[derive(Debug, Clone)]
+pub struct Work(Arc<Counts>, usize);
+
+impl Default for Work {
+    fn default() -> Self {
+        Work(Arc::default(), MOST)
+    }
+}
 
 #[derive(Debug, Default)]
 struct Counts {
@@ -27,11 +44,25 @@ struct Counts {
 }
 
 impl Work {
+    /// The same budget for a search in a part of the records.
+    pub(crate) fn of_part(&self) -> Self {
+        Work(Arc::clone(&self.0), MOST_BESIDE)
+    }
+
+    /// Most causes.
+    pub(crate) fn most_causes(&self) -> usize {
+        self.1
+    }
+
     /// A record is simulated.
     pub(crate) fn add(&self, model: &Model, record: &Record) {
-        let of_plant = match model.plant.cable.inductance > 0.0 {
-            true => CABLE,
-            false => 1,
+        let p = &model.plant;
+        let is_lagged = p.load.cpl_time_constant > 0.0 && record.load.iter().any(|load| load.power != 0.0);
+        let of_plant = match (p.cable.inductance > 0.0, p.source.c_in > 0.0) {
+            (true, _) => CABLE,
+            (false, true) => FILTER,
+            (false, false) if is_lagged => LAG,
+            (false, false) => 1,
         };
         let of_record = if record.settled { SETTLED } else { 1 };
         self.count(record.rows() as u64 * of_plant * of_record);

@@ -1,5 +1,5 @@
 //! The circuit with every effect between two switching edges, by Runge-Kutta steps of fourth order that are short
-//! against its fastest time constant; a load cable among parts that do not change takes the matrix of [`affine`].
+//! against its fastest time constant; a load cable or a fast input filter among parts that do not change takes the matrix of [`affine`].
 //!
 //! Two voltages are algebraic. At the output `v_out = v_c + esr (i_b - i_out) + esl d(i_b - i_out)/dt`, at the input the
 //! source as seen from the switch, `v_th - r_th i`. `i_b` is the winding current, `i_l` that of the inductance itself;
@@ -50,6 +50,10 @@ const WIRED: usize = V_LOAD + 1;
 
 /// The states: inductance current, capacitor voltage, cable, load, source, four low-passes.
 pub(crate) type States = [f64; STATES];
+
+/// Steps of a period from which on a matrix, made anew for each interval, is quicker: it costs as much as some ten of them, and a period has
+/// two intervals and more.
+const MANY_STEPS: f64 = 24.0;
 
 /// What the inductor is connected to: `v_l = share v_in + emf - r i - give v_out`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -113,7 +117,9 @@ impl Full {
             (p.capacitor.derating == 0.0).then(|| 1.0 / p.converter.capacitance),
         ];
         let (has_cable, has_lag) = (p.cable.inductance > 0.0, p.load.cpl_time_constant > 0.0);
-        let is_affine = has_cable && linear.iter().all(Option::is_some) && p.source.ripple == 0.0;
+        let rate = rate::fastest(p).1;
+        let is_fast = has_cable || has_c_in(p) && rate * p.t_sw() > MANY_STEPS;
+        let is_affine = is_fast && linear.iter().all(Option::is_some) && p.source.ripple == 0.0;
         Full {
             p: p.clone(),
             linear,
@@ -123,7 +129,7 @@ impl Full {
             has_many: has_cable || has_lag || has_c_in(p),
             is_wired: has_cable && !has_lag && !has_c_in(p),
             low_pass,
-            rate: rate::fastest(p).1,
+            rate,
             total: rate::total(p),
             is_affine,
         }
@@ -172,7 +178,8 @@ impl Full {
     /// Advances by `h` seconds from time `t`, or until the current reaches 0 if the path stops there, or an open leg
     /// begins to conduct. Returns the time used.
     pub fn advance(&self, x: &mut States, path: &Path, load: &Load, span: (f64, f64), track: &mut Track) -> f64 {
-        if self.is_affine {
+        // without a cable constant power acts at once, and its equation is not linear
+        if self.is_affine && (self.has_cable || load.power == 0.0) {
             return match self.is_wired {
                 true => self.advance_affine::<WIRED>(x, path, load, span, track),
                 false => self.advance_affine::<SHOWN>(x, path, load, span, track),

@@ -36,9 +36,6 @@ const SWAP: f64 = 2.0;
 /// Starts of one cause that are followed. What looks best at first order is not always where the fit ends best, and each more
 /// costs a fit. A convention.
 const BEGUN: usize = 2;
-/// Most causes named. Records of one converter hold 5 to 15 independent directions; blind cases hide at most two effects, and the
-/// third place is for one that a second imitates in part.
-const MOST: usize = 3;
 /// Candidates that are fitted after a linear look at all. A convention: each costs a fit.
 const LOOKED_AT: usize = 5;
 /// Further sets that are tried as the start of a larger one, and candidates that are fitted beside each. Conventions: they bound
@@ -153,10 +150,10 @@ impl Searcher<'_> {
         };
         let mut best = self.polished(first);
         let mut before = null.chi2;
-        while best.causes.len() < MOST
+        while best.causes.len() < self.fitter.problem.work.most_causes()
             && best.values.len() < most
             && !self.is_hopeless(&best, before)
-            && !self.is_out_of_reach(&best)
+            && !self.is_out_of_reach(&best.state, &|_| false)
             && self.fitter.problem.work.goes_on()
         {
             let stage = format!("more than {}", self.names(&best));

@@ -59,7 +59,11 @@ impl Searcher<'_> {
 
     /// How much structure a fit leaves.
     pub(super) fn structure(&self, fit: &Fit) -> f64 {
-        let left = structures(self.fitter.problem, self.fitter.null, &fit.state, 1.0);
+        self.left_by(&fit.state)
+    }
+
+    fn left_by(&self, state: &State) -> f64 {
+        let left = structures(self.fitter.problem, self.fitter.null, state, 1.0);
         left.iter().map(|one| one.slow.max(one.mean_square) - 1.0).sum()
     }
 
@@ -83,17 +87,28 @@ impl Searcher<'_> {
         fit.causes.len() > 1 && (leaves_much || adds_little)
     }
 
-    /// Whether all candidates together explain too little of what a fit leaves for any few of them to explain it.
-    pub(super) fn is_out_of_reach(&self, fit: &Fit) -> bool {
-        let count = self.fitter.problem.count().max(1) as f64;
-        if fit.state.chi2 < WELL_ABOVE * count || self.structure(fit) == 0.0 {
+    /// Whether all candidates together explain too little of what a state leaves for any few of them to explain it; places of the residual that
+    /// are `aside` have been left out of what is to be explained.
+    pub(crate) fn is_out_of_reach(&self, state: &State, aside: &(dyn Fn(usize) -> bool + Sync)) -> bool {
+        let rest = |mut values: Vec<f64>| {
+            let all = values.iter_mut().enumerate();
+            all.filter(|(place, _)| aside(*place))
+                .for_each(|(_, value)| *value = 0.0);
+            values
+        };
+        let mut left = state.residual.clone();
+        self.fitter.basis.project(&mut left);
+        let mut left = rest(left);
+        let count = left.iter().filter(|value| **value != 0.0).count().max(1) as f64;
+        let before = dot(&left, &left);
+        if before < WELL_ABOVE * count || self.left_by(state) == 0.0 {
             return false;
         }
         let all: Vec<usize> = (0..self.fitter.candidates.len()).collect();
-        let directions = parallel::map(&all, |cause| self.directions(*cause, &fit.state));
-        let mut left = fit.state.residual.clone();
-        self.fitter.basis.project(&mut left);
-        let before = dot(&left, &left);
+        let directions = parallel::map(&all, |cause| {
+            let own = self.directions(*cause, state).into_iter();
+            own.map(rest).collect::<Vec<_>>()
+        });
         let after = without(&mut left, directions.into_iter().flatten());
         after > WELL_ABOVE * count && after > OUT_OF_REACH * before
     }

@@ -1,5 +1,5 @@
-//! A circuit with a load cable of which no part changes with current, voltage or time. Between two edges it is linear but for the
-//! constant power, and a matrix takes its states over a step exactly.
+//! A circuit with a load cable, or with an input filter and no constant power, of which no part changes with current, voltage or time. Between two
+//! edges it is linear but for the constant power, and a matrix takes its states over a step exactly.
 //!
 //! `x' = A x + b + e r(v)`, v the load's voltage. `A` and `b` hold the tangent of the constant power's current at the voltage `u` of
 //! the moment when they were made; `r` is what the tangent leaves. Over a step of `h` seconds, with `X = h A`, `phi_1 = sum X^k / (k+1)!`
@@ -17,7 +17,7 @@ mod step;
 mod tests;
 
 use self::step::Step;
-use super::{Full, I_CABLE, I_CPL, I_L, Path, SHOWN, States, V_LOAD, between, first, left, moved};
+use super::{Full, I_CPL, I_L, Path, SHOWN, States, V_LOAD, between, first, left, moved};
 use crate::lag;
 use crate::plain::Track;
 use crate::rate;
@@ -117,6 +117,7 @@ struct Circuit<const N: usize> {
     rises: Row<N>,
     bends: Row<N>,
     i_l: Row<N>,
+    i_out: Row<N>,
     v_in: Row<N>,
     /// What keeps the path.
     left: Row<N>,
@@ -146,6 +147,7 @@ impl<const N: usize> Circuit<N> {
             rises: none,
             bends: none,
             i_l: row(zero.signals.i_l),
+            i_out: row(zero.signals.i_out),
             v_in: row(zero.signals.v_in),
             left: row(left(&zero, path)),
         };
@@ -158,6 +160,7 @@ impl<const N: usize> Circuit<N> {
             }
             circuit.v_out.of[n] = one.signals.v_out - zero.signals.v_out;
             circuit.i_l.of[n] = one.signals.i_l - zero.signals.i_l;
+            circuit.i_out.of[n] = one.signals.i_out - zero.signals.i_out;
             circuit.v_in.of[n] = one.signals.v_in - zero.signals.v_in;
             circuit.left.of[n] = left(&one, path) - circuit.left.add;
         }
@@ -216,7 +219,7 @@ impl<const N: usize> Circuit<N> {
         Signals {
             v_out: self.v_out.at(x),
             i_l: self.i_l.at(x),
-            i_out: x[I_CABLE],
+            i_out: self.i_out.at(x),
             v_in: self.v_in.at(x),
         }
     }
@@ -271,13 +274,15 @@ impl Full {
         let fold = self.p.load.v_fold;
         let (state, factor) = match self.has_lag {
             true => (I_CPL, 1.0 / self.p.load.cpl_time_constant),
-            false => (V_LOAD, -1.0 / self.p.cable.capacitance),
+            false if self.has_cable => (V_LOAD, -1.0 / self.p.cable.capacitance),
+            // there is no power then
+            false => (V_LOAD, 0.0),
         };
         Tangent {
             power: load.power,
             fold,
             u: v,
-            per_u: if v < fold { 0.0 } else { 1.0 / v },
+            per_u: if v < fold || !self.has_cable { 0.0 } else { 1.0 / v },
             folded: v < fold,
             state,
             factor,
@@ -324,7 +329,7 @@ impl Full {
             let asked = (self.rate.max(far) * FEWER).max(circuit.tangent.grows() / rate::OTHER_STEP);
             let mut count = ((h - used) * asked).ceil().clamp(1.0, MOST) as u64;
             let length = (h - used) / count as f64;
-            let total = self.total + load.conductance / self.p.cable.capacitance + circuit.tangent.fastest();
+            let total = self.total + far * rate::OTHER_STEP + circuit.tangent.fastest();
             let step = Step::new(&circuit, length, total);
             let lags = has_lags.then(|| lag::of_sensors(length, &self.low_pass));
             let mut before = circuit.end(&x);

@@ -163,6 +163,8 @@ fn column(group: Group, case: &Surveyed, became: &Became) -> &'static str {
                 ("refused", _) => "refused",
                 ("consistent", _) => "missed",
                 (_, Outcome::Right) if shaped => "right",
+                // the physics itself, which says more than a shape
+                ("explained" | "ambiguous", Outcome::Right) => "right by cause",
                 (_, Outcome::Right) => "right, other shape",
                 _ => "wrong word",
             }

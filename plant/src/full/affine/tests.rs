@@ -59,6 +59,13 @@ fn case(name: &'static str, v_out: f64, loads: [Load; 2], change: fn(&mut Parame
     (name, p, v_out, loads)
 }
 
+/// An input filter that swings at 110 kHz, and no cable.
+fn filter(p: &mut Parameters) {
+    (p.cable.inductance, p.cable.resistance, p.cable.capacitance) = (0.0, 0.0, 0.0);
+    (p.source.resistance, p.source.inductance) = (0.05, 2e-6);
+    (p.source.c_in, p.source.esr_in) = (1e-6, 0.1);
+}
+
 fn cases() -> Vec<Case> {
     let (power, current) = (Load::power, Load::current);
     let (heavy, light) = ([power(200.0), power(800.0)], [Load::resistor(400.0), power(30.0)]);
@@ -99,6 +106,21 @@ fn cases() -> Vec<Case> {
         case("source", 100.0, heavy, |p| {
             (p.source.resistance, p.source.inductance) = (0.3, 2e-6);
             (p.source.c_in, p.source.esr_in) = (100e-6, 0.02);
+        }),
+        case("source alone", 100.0, linear, filter),
+        case(
+            "source with a light load",
+            100.0,
+            [Load::resistor(400.0), current(0.2)],
+            filter,
+        ),
+        case("source without inductance", 100.0, linear, |p| {
+            filter(p);
+            (p.source.inductance, p.source.c_in) = (0.0, 1e-6);
+        }),
+        case("source of a boost", 320.0, linear, |p| {
+            filter(p);
+            (p.converter.topology, p.sensors.i_out.low_pass) = (Topology::Boost, 20e-6);
         }),
         case("boost", 320.0, heavy, |p| p.converter.topology = Topology::Boost),
         case("buck-boost", 200.0, light, |p| {

@@ -15,7 +15,7 @@ use crate::real::Real;
 use crate::sanitise::{InputError, Sample, Signal};
 use crate::sound::Sound;
 use crate::state::{Coefficients, Remembered, State};
-use crate::trace::{Command, Decision, FeatureTrace, Trace};
+use crate::trace::{Command, Decision, FeatureTrace, LayerTrace, Trace};
 
 /// A policy at work, in the number format `T`.
 #[derive(Debug, Clone)]
@@ -220,6 +220,15 @@ impl<T: Real> Controller<T> {
 
     /// Outputs of the network for an observation: Q values, one per action, or the output of a continuous head (section 6). Values need not lie within the observation's bounds.
     pub fn q_values(&self, observation: &ArrayView1<'_, T>) -> Result<Array1<T>, InputError> {
+        let mut layers = self.layers(observation)?;
+        Ok(layers.pop().map(|last| last.post_activation).unwrap_or_default())
+    }
+
+    /// Every layer of the network for an observation, first to last (section 6). Values need not lie within the observation's bounds.
+    ///
+    /// # Errors
+    /// If the observation is of another length.
+    pub fn layers(&self, observation: &ArrayView1<'_, T>) -> Result<Vec<LayerTrace<T>>, InputError> {
         let expected = self.features.len();
         if observation.len() != expected {
             return Err(InputError::ObservationLength {
@@ -229,7 +238,7 @@ impl<T: Real> Controller<T> {
         }
         let mut layers = self.network.blank();
         self.network.run(observation.view(), &mut layers);
-        Ok(layers.pop().map(|last| last.post_activation).unwrap_or_default())
+        Ok(layers)
     }
 
     /// Action index and duty before the mapping of a network's outputs (sections 7 and 7b), as many as there are; of a residual

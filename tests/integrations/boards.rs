@@ -99,8 +99,8 @@ fn a_flipped_weight_bit_fails_on_every_board() {
     let policy = golden_case("paper");
     let mut files = kit(&policy);
     let text = files.get_mut("paper.c").unwrap();
-    let literal = super::kit::first_literal(text, "paper_weights0[");
-    *text = text.replacen(&literal, &super::kit::flipped(&literal), 1);
+    let literal = super::kit_defects::first_literal(text, "paper_weights0[");
+    *text = text.replacen(&literal, &super::kit_defects::flipped(&literal), 1);
     for target in emulated() {
         let (code, failed) = run(&policy, target, &files, &[]).unwrap();
         // not the integrity check alone: the known answers see it as well

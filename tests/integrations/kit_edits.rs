@@ -154,22 +154,51 @@ fn tokens(line: &str) -> Vec<std::ops::Range<usize>> {
     all
 }
 
+/// Whether a line may be left out: an assignment, and no declaration that others read.
+fn is_assignment(line: &str) -> bool {
+    line.ends_with(';') && line.contains(" = ") && !line.trim_start().starts_with("const")
+}
+
 /// An edit, drawn: a token of any line of code, or a statement that is left out.
 fn draw(text: &str, random: &mut SplitMix) -> Option<(Edit, String)> {
-    let lines: Vec<&str> = text.lines().collect();
     let code = code(text);
     let line = code[random.below(code.len())];
+    let old = text.lines().nth(line)?;
+    if is_assignment(old) && random.below(8) == 0 {
+        return Some(edited(text, line, None));
+    }
+    let places = tokens(old);
+    let place = places.get(random.below(places.len().max(1)))?.clone();
+    let others = others(&old[place.clone()]);
+    let other = others.get(random.below(others.len().max(1)))?;
+    Some(edited(text, line, Some((place, other))))
+}
+
+/// Every edit that can be drawn.
+fn every(text: &str) -> Vec<(Edit, String)> {
+    let lines: Vec<&str> = text.lines().collect();
+    let of_line = |line: usize| {
+        let old = lines[line];
+        let each = tokens(old).into_iter().flat_map(move |place| {
+            let others = others(&old[place.clone()]).into_iter();
+            others.map(move |other| edited(text, line, Some((place.clone(), &other))))
+        });
+        let left_out = is_assignment(old).then(|| edited(text, line, None));
+        each.chain(left_out)
+    };
+    code(text).into_iter().flat_map(of_line).collect()
+}
+
+/// The text with another token at a place of a line, or without the line.
+fn edited(text: &str, line: usize, change: Option<(std::ops::Range<usize>, &str)>) -> (Edit, String) {
+    let lines: Vec<&str> = text.lines().collect();
     let old = lines[line];
-    let is_assignment = old.ends_with(';') && old.contains(" = ") && !old.trim_start().starts_with("const");
-    let (token, other, new) = if is_assignment && random.below(8) == 0 {
-        (String::new(), String::new(), String::new())
-    } else {
-        let places = tokens(old);
-        let place = places.get(random.below(places.len().max(1)))?.clone();
-        let others = others(&old[place.clone()]);
-        let other = others.get(random.below(others.len().max(1)))?;
-        let new = format!("{}{other}{}", &old[..place.start], &old[place.end..]);
-        (old[place].to_owned(), other.clone(), new)
+    let (token, other, new) = match change {
+        Some((place, other)) => {
+            let new = format!("{}{other}{}", &old[..place.start], &old[place.end..]);
+            (old[place].to_owned(), other.to_owned(), new)
+        }
+        None => (String::new(), String::new(), String::new()),
     };
     let part = part(&lines, line);
     let mut edited = lines;
@@ -183,7 +212,7 @@ fn draw(text: &str, random: &mut SplitMix) -> Option<(Edit, String)> {
         before: old.trim().to_owned(),
         after: new.trim().to_owned(),
     };
-    Some((edit, edited))
+    (edit, edited)
 }
 
 /// An edit and what came of it.
@@ -197,8 +226,9 @@ struct Tried {
 /// Compilers and flags of the edits: an access outside of an array is a finding, too, whatever it changes.
 const SANITISED: [&str; 4] = ["gcc", "-O1", "-fsanitize=address,bounds", "-fno-sanitize-recover=all"];
 
-/// Draws edits that give other machine code until so many of them change something by all that the rules know.
-fn tried(policy: &Policy, seed: u64, count: usize) -> Vec<Tried> {
+/// Draws edits that give other machine code until so many of them change something by all that the rules know; all of them if no
+/// count is given.
+fn tried(policy: &Policy, seed: u64, count: Option<usize>) -> Vec<Tried> {
     let folder = tempfile::tempdir().unwrap();
     let files = files(policy, Output::Kit, STEPS);
     write(&files, folder.path());
@@ -215,10 +245,12 @@ fn tried(policy: &Policy, seed: u64, count: usize) -> Vec<Tried> {
     let sound = compiled(&core, "core.o").unwrap();
     let mut random = SplitMix::new(seed);
     let mut tried: Vec<Tried> = Vec::new();
-    while tried.iter().filter(|tried| tried.same.is_none()).count() < count {
-        let Some((edit, text)) = draw(&files[&core], &mut random) else {
-            continue;
-        };
+    let drawn = std::iter::from_fn(|| Some(draw(&files[&core], &mut random)));
+    let edits: Box<dyn Iterator<Item = (Edit, String)>> = match count {
+        Some(_) => Box::new(drawn.flatten()),
+        None => Box::new(every(&files[&core]).into_iter()),
+    };
+    for (edit, text) in edits {
         std::fs::write(folder.path().join(&core), text).unwrap();
         // the same machine code is no edit: a branch of another machine's, or another way to say the same
         if compiled(&core, "core.o").is_none_or(|object| object == sound) {
@@ -242,6 +274,10 @@ fn tried(policy: &Policy, seed: u64, count: usize) -> Vec<Tried> {
         );
         let same = same.or_else(|| kit_equal::why_unseen(&edited).filter(|_| !is_found));
         tried.push(Tried { edit, is_found, same });
+        let changing = || tried.iter().filter(|tried| tried.same.is_none()).count();
+        if count.is_some_and(|count| changing() >= count) {
+            break;
+        }
     }
     tried
 }
@@ -276,19 +312,20 @@ fn timed(folder: &std::path::Path) -> Ran {
     tests::tools::run(std::process::Command::new("timeout").arg("20").arg(program))
 }
 
-/// `POLICYC_KIT_SEED` picks other edits, `POLICYC_KIT_EDITS` more of them.
+/// `POLICYC_KIT_SEED` picks other edits, `POLICYC_KIT_EDITS` more of them; `all` takes an hour.
 #[test]
 fn edits_from_a_seed_are_found() {
-    let number = |name: &str, usual: u64| std::env::var(name).map_or(usual, |text| text.parse().unwrap());
-    let usual = if tests::full() { 60 } else { 6 };
-    let (seed, count) = (
-        number("POLICYC_KIT_SEED", 77_123),
-        number("POLICYC_KIT_EDITS", usual) as usize,
-    );
+    let asked = |name: &str, usual: &str| std::env::var(name).unwrap_or(usual.to_owned());
+    let seed: u64 = asked("POLICYC_KIT_SEED", "77123").parse().unwrap();
+    let count = match asked("POLICYC_KIT_EDITS", if tests::full() { "60" } else { "6" }).as_str() {
+        "all" => None,
+        number => Some(number.parse::<usize>().unwrap()),
+    };
     let policies = [example(), golden_case("constructs")];
-    let missed = |(policy, seed): (&Policy, u64)| told(policy, seed, &tried(policy, seed, count.div_ceil(2)));
+    let half = count.map(|count| count.div_ceil(2));
+    let missed = |(policy, seed): (&Policy, u64)| told(policy, seed, &tried(policy, seed, half));
     let missed: usize = policies.iter().zip(seed..).map(missed).sum();
-    assert_eq!(missed, 0, "of {count}");
+    assert_eq!(missed, 0, "of {count:?}");
 }
 
 /// Most of them hit what the outputs share; the others hit any of the three.
@@ -296,7 +333,7 @@ fn edits_from_a_seed_are_found() {
 fn edits_from_a_seed_are_found_with_several_outputs() {
     let (policy, seed) = (legs("constructs"), 9);
     let count = if tests::full() { 30 } else { 4 };
-    assert_eq!(told(&policy, seed, &tried(&policy, seed, count)), 0, "of {count}");
+    assert_eq!(told(&policy, seed, &tried(&policy, seed, Some(count))), 0, "of {count}");
 }
 
 /// What is drawn compiles to another program: edits of nothing would always be missed, and edits of tables always found.
@@ -321,6 +358,8 @@ fn edits_are_drawn_from_the_code_alone() {
     assert_eq!(at("span->crc = buck12_crc_word"), Part::Checks);
     assert_eq!(at("buck12_within(measured->v_out"), Part::Controller);
     assert_eq!(at("state->mapping_check = "), Part::Controller);
+    let every = every(&text);
+    assert!(every.iter().all(|(_, edited)| *edited != text));
     let mut random = SplitMix::new(1);
     for _ in 0..200 {
         let Some((edit, edited)) = draw(&text, &mut random) else {

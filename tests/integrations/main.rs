@@ -6,6 +6,7 @@ mod boards;
 mod c2000;
 mod fmu;
 mod kit;
+mod kit_defects;
 mod kit_edits;
 mod kit_equal;
 mod rust;

@@ -9,13 +9,15 @@ use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensorError};
 use targets::TargetSpec;
 
-/// How a network is drawn: `# network: seed 7, widths 3-33-20`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// How a network is drawn: `# network: seed 7, widths 3-33-20`, or with `, biases 0.25` behind it.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Recipe {
     /// Seed of the weights.
     pub seed: u64,
     /// Inputs, then outputs of each layer.
     pub widths: Vec<usize>,
+    /// Spread of the biases in that of the weights: with small ones the sums of every layer come to both sides of 0.
+    pub biases: f64,
 }
 
 impl Recipe {
@@ -25,11 +27,13 @@ impl Recipe {
         let line = contract
             .lines()
             .find_map(|line| line.strip_prefix("# network: seed "))?;
-        let (seed, widths) = line.split_once(", widths ")?;
+        let (seed, rest) = line.split_once(", widths ")?;
+        let (widths, biases) = rest.split_once(", biases ").unwrap_or((rest, "1"));
         let widths: Result<Vec<usize>, _> = widths.trim().split('-').map(str::parse).collect();
         Some(Self {
             seed: seed.parse().ok()?,
             widths: widths.ok()?,
+            biases: biases.trim().parse().ok()?,
         })
     }
 
@@ -43,16 +47,20 @@ impl Recipe {
         for (layer, pair) in self.widths.windows(2).enumerate() {
             let (inputs, outputs) = (pair[0], pair[1]);
             let spread = 1.5 / (inputs as f64).sqrt();
-            let mut draw = |count: usize| -> Vec<u8> {
+            let mut draw = |count: usize, spread: f64| -> Vec<u8> {
                 let values = (0..count).map(|_| rng.uniform(-spread, spread) as f32);
                 values.flat_map(f32::to_le_bytes).collect()
             };
             tensors.push((
                 format!("fc{layer}.weight"),
                 vec![outputs, inputs],
-                draw(inputs * outputs),
+                draw(inputs * outputs, spread),
             ));
-            tensors.push((format!("fc{layer}.bias"), vec![outputs], draw(outputs)));
+            tensors.push((
+                format!("fc{layer}.bias"),
+                vec![outputs],
+                draw(outputs, self.biases * spread),
+            ));
         }
         let views = tensors
             .iter()
@@ -91,7 +99,9 @@ mod tests {
     #[test]
     fn a_recipe_is_read_from_the_contract() {
         let recipe = Recipe::of("# a\n# network: seed 12, widths 3-5-4\nname = 1\n").unwrap();
-        assert_eq!((recipe.seed, recipe.widths), (12, vec![3, 5, 4]));
+        assert_eq!((recipe.seed, recipe.widths, recipe.biases), (12, vec![3, 5, 4], 1.0));
+        let recipe = Recipe::of("# network: seed 12, widths 3-5-4, biases 0.25").unwrap();
+        assert_eq!((recipe.widths, recipe.biases), (vec![3, 5, 4], 0.25));
         assert_eq!(Recipe::of("name = 1\n"), None);
     }
 
@@ -100,6 +110,7 @@ mod tests {
         let recipe = Recipe {
             seed: 1,
             widths: vec![2, 3, 2],
+            biases: 1.0,
         };
         let file = recipe.network().unwrap();
         let start = first_byte(&file, "fc1.bias").unwrap();
@@ -114,6 +125,7 @@ mod tests {
             Recipe {
                 seed,
                 widths: vec![2, 3],
+                biases: 1.0,
             }
             .network()
             .unwrap()

@@ -25,6 +25,8 @@ pub struct Subject {
     pub answer: Vec<String>,
     /// Comparison of the rest of the answer, and the way to the next move.
     pub rest: Vec<String>,
+    /// The network for an observation, and the comparison of its Q values.
+    pub network: Vec<String>,
     /// Checksum over the state.
     pub state_crc: String,
     /// Numbers in the state, before its two counters, as a literal.

@@ -5,7 +5,9 @@
 //!  damaged    each number just outside of what a sound state holds          what no run meets
 //!  capped     a soft start that stands at the duty itself                   what a run meets by chance
 //!  tied       two actions of exactly equal value                            what a run meets once in millions of steps
-//!  sided      both sides of every sum of the network, clips that are alike  what has to be looked for
+//!  sided      each action that wins, Q values that are all below 0          what has to be looked for
+//!  alike      clips that are alike                                          what has to be looked for
+//!  summed     both sides of each bend of an activation, the network alone   what no run need meet
 //!  random     the stream of `policyc verify`
 //! ```
 
@@ -67,9 +69,16 @@ impl<'a, T: Real> Course<'a, T> {
     }
 
     pub(super) fn play(&mut self, event: Event) -> Result<(), InputError> {
-        if let Event::Step(samples) = &event {
-            let trace = self.oracle.controller().eval(samples)?;
-            self.sides.note(self.policy, &trace);
+        match &event {
+            Event::Step(samples) => {
+                let trace = self.oracle.controller().eval(samples)?;
+                self.sides.note(self.policy, &trace);
+            }
+            Event::Network(observation) => {
+                let layers = self.layers(observation)?.unwrap_or_default();
+                self.sides.note_layers(self.policy, &layers);
+            }
+            _ => {}
         }
         let chunk = self.oracle.chunk_of(vec![event])?;
         append(self.policy, &self.layout, &chunk, Seen::Numbers, &mut self.trace);
@@ -317,9 +326,9 @@ fn append(policy: &Policy, layout: &Layout, chunk: &Chunk, seen: Seen, trace: &m
             }
             Event::Reset => trace.reset(answer.iter().copied()),
             Event::Init => trace.init(answer.iter().copied()),
-            // the stream has none of these; the generated code has its own known answers
             Event::Network(observation) => {
-                take(&mut input, number * observation.len());
+                let given = take(&mut input, number * observation.len());
+                trace.network(given, answer.iter().copied());
             }
         }
     }

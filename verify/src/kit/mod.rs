@@ -90,6 +90,7 @@ pub fn material(policy: &Policy, target: &TargetSpec, steps: u32) -> Result<Mate
         // memory once more
         let moves = match name {
             "suite" => Moves::All,
+            "blocks" => Moves::Network,
             _ => Moves::Random,
         };
         trace(&part, SUITE_STEPS, moves).map(|trace| (program, trace))
@@ -132,6 +133,8 @@ pub fn constructs() -> Result<Policy, VerifyError> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Moves {
     All,
+    /// Those of the network, then random ones.
+    Network,
     Random,
 }
 
@@ -153,6 +156,9 @@ fn trace_in<T: Real>(policy: &Policy, steps: u32, moves: Moves) -> Result<Trace,
         course.tied().map_err(VerifyError::Interpreter)?;
         course.sided().map_err(VerifyError::Interpreter)?;
         course.alike().map_err(VerifyError::Interpreter)?;
+    }
+    if moves != Moves::Random {
+        course.summed().map_err(VerifyError::Interpreter)?;
     }
     course.random(steps, SEED).map_err(VerifyError::Interpreter)?;
     Ok(course.trace)

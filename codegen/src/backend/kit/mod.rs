@@ -103,6 +103,7 @@ fn subject(kit: &str, program: &Program, trace: &Trace) -> Subject {
         measurement_words,
         answer: texts.answer(),
         rest: texts.rest(),
+        network: texts.network(),
         state_crc: texts.state_crc("0xFFFFFFFFu", "state."),
         state_numbers: unsigned(((program.state_words() - 2) / program.scalar().words()) as u32),
         mappings: settable(&texts),

@@ -109,6 +109,28 @@ impl Texts<'_> {
         }
     }
 
+    /// Network and comparison of a move that has an observation from `word` on, and the way to the next move.
+    pub fn network(&self) -> Vec<String> {
+        let (k, s, u) = (self.kit, &self.program.name, self.program.name.to_uppercase());
+        let (number, crc) = match self.is_wide() {
+            true => (format!("{k}_number(&word[2u * i])"), "crc_numbers"),
+            false => (format!("{k}_float(word[i])"), "crc"),
+        };
+        let words = self.program.scalar().words() * self.program.features.len();
+        vec![
+            format!("for (i = 0u; i < {u}_FEATURES; ++i) {{"),
+            format!("    observation[i] = {number};"),
+            "}".to_owned(),
+            format!("{s}_q_values(observation, q);"),
+            self.check(
+                "CRC of Q values of an observation",
+                words,
+                &format!("{k}_{crc}(0xFFFFFFFFu, q, {u}_ACTIONS) ^ 0xFFFFFFFFu"),
+            ),
+            format!("return word + {};", words + 1),
+        ]
+    }
+
     /// Declarations of the coefficients, read from `word`.
     pub fn coefficients(&self, names: &[&str]) -> Vec<String> {
         let k = self.kit;

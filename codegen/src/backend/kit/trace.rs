@@ -12,6 +12,7 @@ mod kind {
     pub const INIT: u32 = 3;
     pub const DAMAGE: u32 = 4;
     pub const STEP_WITHOUT_NUMBERS: u32 = 5;
+    pub const NETWORK: u32 = 6;
 }
 
 /// Moves and answers, one after the other.
@@ -92,6 +93,13 @@ impl Trace {
         self.words.extend([word, bits, crc32_words(state)]);
     }
 
+    /// The network alone: bits of an observation, which need not be one that a step reaches; of the Q values the checksum is kept.
+    pub fn network(&mut self, observation: &[u32], q_values: impl IntoIterator<Item = u32>) {
+        self.open(kind::NETWORK);
+        self.words.extend_from_slice(observation);
+        self.words.push(crc32_words(q_values));
+    }
+
     fn open(&mut self, kind: u32) {
         self.words.push(kind);
         self.events += 1;
@@ -116,6 +124,7 @@ mod tests {
         trace.step(&[7, 8], &[1, 2, 3, 4], rest);
         trace.set_mapping(0, &[5, 6, 7], 1, []);
         trace.set_mapping(2, &[5, 6, 7], 0, []);
+        trace.network(&[8, 9], rest);
         assert_eq!(
             trace.words(),
             [
@@ -140,9 +149,13 @@ mod tests {
                 6,
                 7,
                 0,
-                0
+                0,
+                6,
+                8,
+                9,
+                0x9AE0_DAAF
             ]
         );
-        assert_eq!((trace.events(), trace.steps()), (4, 1));
+        assert_eq!((trace.events(), trace.steps()), (5, 1));
     }
 }

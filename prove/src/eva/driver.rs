@@ -9,7 +9,7 @@
 //! They are made from the policy and the numeric contract. Of the generated code they know its interface and, for what needs no
 //! network, the three functions of a step around it.
 
-use policy::{Activation, NumericFormat, Policy};
+use policy::{NumericFormat, Policy};
 
 use super::frama_c::{Machine, Numbers};
 use super::head::{Answer, passes_nan, reads_state};
@@ -57,8 +57,6 @@ pub(super) struct Entry {
     pub parts: usize,
     /// Functions of the policy, without its prefix, whose contract stands for their text. Another entry shows the contract.
     pub assumed: Vec<String>,
-    /// Functions of the policy, without its prefix, in which cases are not kept apart.
-    pub merged: Vec<String>,
     /// Frama-C's `-eva-precision`, in the order in which they are tried until one shows everything.
     pub precisions: &'static [u8],
 }
@@ -189,7 +187,6 @@ impl Writer<'_> {
             runs: BITS_AND_FINITE,
             parts: 1,
             assumed: vec![if self.is_integer() { "network" } else { "q_values" }.to_owned()],
-            merged: Vec::new(),
             precisions: COARSE_FIRST,
         }
     }
@@ -253,7 +250,6 @@ impl Writer<'_> {
             runs: if self.takes_output_as_it_is() { BOTH } else { STEP },
             parts: 1,
             assumed: std::iter::once(ACTION.to_owned()).chain(self.flips()).collect(),
-            merged: Vec::new(),
             precisions: match self.answer() {
                 // the law multiplies what the state holds
                 Answer::Gains(_) if self.policy.head.schedule().is_some() => FINE,
@@ -304,7 +300,6 @@ impl Writer<'_> {
             runs: BOTH,
             parts: 1,
             assumed: vec![ACTION.to_owned()],
-            merged: Vec::new(),
             precisions: FINE,
         }
     }
@@ -377,7 +372,6 @@ impl Writer<'_> {
             runs: ONE,
             parts,
             assumed: vec![ACTION.to_owned()],
-            merged: Vec::new(),
             precisions: COARSE_FIRST,
         })
     }
@@ -406,19 +400,6 @@ impl Writer<'_> {
             self.keeps("slices", *at, other);
         }
         self.text.lines(["}", ""]);
-    }
-
-    /// The curves of a network in integers that are computed piece by piece.
-    pub fn curves(&self) -> Vec<String> {
-        let all = self.policy.layers.iter().map(|layer| layer.activation);
-        let mut words: Vec<&str> = all
-            .filter(|activation| activation.curve().is_some() && activation.range().is_none())
-            .map(Activation::word)
-            .collect();
-        words.sort_unstable();
-        words.dedup();
-        let integer = words.into_iter().filter(|_| self.is_integer());
-        integer.map(|word| format!("{word}_integer")).collect()
     }
 
     /// Whether the network computes in integers.

@@ -104,7 +104,6 @@ fn command(analysis: Analysis<'_>, precision: u8, table: &Path) -> Command {
     let Entry {
         function: entry,
         assumed,
-        merged,
         ..
     } = analysis.entry;
     let (finite, special) = match numbers {
@@ -139,14 +138,9 @@ fn command(analysis: Analysis<'_>, precision: u8, table: &Path) -> Command {
             .arg("-eva-split-return-function")
             .arg(format!("{policy}_{function}:full"));
     }
-    // the pieces of a curve are there for its value, not to be kept apart behind it
-    let curves = merged
-        .iter()
-        .map(|name| format!(",{policy}_{name}:0"))
-        .collect::<String>();
     command
         .arg("-eva-slevel-function")
-        .arg(format!("{policy}_guard:0,{policy}_sense:0{curves}"));
+        .arg(format!("{policy}_guard:0,{policy}_sense:0"));
     for function in assumed {
         command.arg("-eva-use-spec").arg(format!("{policy}_{function}"));
     }

@@ -2,6 +2,7 @@
 
 mod calls;
 mod command;
+mod curves;
 mod driver;
 mod frama_c;
 mod head;

@@ -61,6 +61,20 @@ pub(super) struct Entry {
     pub precisions: &'static [u8],
 }
 
+impl Entry {
+    /// The function in which a run of a part begins.
+    pub fn main(&self, part: usize) -> String {
+        main_of(self.function, self.parts, part)
+    }
+}
+
+fn main_of(function: &str, parts: usize, part: usize) -> String {
+    match parts {
+        1 => function.to_owned(),
+        _ => format!("{function}_{part}"),
+    }
+}
+
 /// A file of C and its entries.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Driver {
@@ -347,21 +361,16 @@ impl Writer<'_> {
         if calls.is_empty() {
             return None;
         }
-        self.text.lines([
-            "void prove_slices(void)",
-            "{",
-            "sound(&any_sound);",
-            "measure(&any_measured);",
-        ]);
-        self.any_command("any_command");
         // side by side: the time of a run is that of its slices
         let parts = calls.len().div_ceil(PART).min(MOST_PARTS);
         for (part, calls) in calls.chunks(calls.len().div_ceil(parts)).enumerate() {
-            self.text.line(format!("#if PART == {part}"));
+            self.text
+                .line(format!("void {}(void)", main_of("prove_slices", parts, part)));
+            self.text.lines(["{", "sound(&any_sound);", "measure(&any_measured);"]);
+            self.any_command("any_command");
             self.text.lines(calls.iter());
-            self.text.line("#endif");
+            self.close();
         }
-        self.close();
         Some(Entry {
             function: "prove_slices",
             about: "commit from every sound state, in slices of the memories of low-pass filters, every measurement and command",

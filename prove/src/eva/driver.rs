@@ -13,8 +13,9 @@ use policy::{NumericFormat, Policy};
 
 use super::frama_c::{Machine, Numbers};
 use super::head::{Answer, passes_nan, reads_state};
-use super::invariant::{Invariant, Shown, Word, slices};
+use super::invariant::{Invariant, Shown, Word};
 use super::number::Number;
+use super::slices::slices;
 use super::stated::{Stated, stated};
 use super::text::{Labels, Text};
 
@@ -330,14 +331,14 @@ impl Writer<'_> {
             let Some(word) = self.invariant.memory_word(index).cloned() else {
                 continue;
             };
-            let (Shown::InSlices { gain }, Some((_, bound))) = (word.shown, word.ends) else {
+            let (Shown::InSlices { gain, input }, Some((_, bound))) = (word.shown, word.ends) else {
                 continue;
             };
             let behind = words.iter().enumerate();
             let kept = behind.filter(|(_, other)| **other == word || other.shown == Shown::WithSlicesOf(index));
             let kept: Vec<(usize, Word)> = kept.map(|(at, other)| (at, other.clone())).collect();
             let first = (format!("{} at the first sample", word.name), FIRST);
-            let Some(ends) = slices(bound, gain) else {
+            let Some(ends) = slices(bound, input, gain) else {
                 self.not_stated
                     .extend(kept.into_iter().map(|(_, word)| (word.name, WHY)));
                 continue;

@@ -9,6 +9,7 @@ mod head;
 mod inputs;
 mod invariant;
 mod number;
+mod slices;
 mod stated;
 mod text;
 

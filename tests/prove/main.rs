@@ -67,6 +67,20 @@ fn nothing_goes_wrong_in_a_small_controller() {
     assert_proved(&in_format("tests/golden/cases/minimal", NumericFormat::I16));
 }
 
+/// ELU and softplus, two layers in which intervals of their terms are far too wide, and one whose sums come near to 32 bits.
+#[test]
+fn sums_behind_curves_without_an_upper_end_fit() {
+    for seed in [1_795_689_093, 1_795_689_092] {
+        let folder = tests::random::policy(seed).unwrap();
+        let policy = policy::load(&folder.path()).unwrap().with_format(NumericFormat::I16);
+        let claims =
+            watched(|watch| eva::prove_sources(task(&policy), &sources(&policy), Some("prove_network"), watch))
+                .unwrap();
+        let claim = claims.iter().find(|claim| claim.name == "network-runs").unwrap();
+        assert_eq!(claim.verdict, Verdict::Proved, "{seed}: {:?}", claim.details);
+    }
+}
+
 #[test]
 fn nothing_goes_wrong_in_a_controller_with_two_outputs() {
     let formats = [

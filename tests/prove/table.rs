@@ -1,13 +1,14 @@
 //! What proofs of random policies cost: a table for `docs/results/proofs.md`, on demand.
 //!
-//! `POLICYC_PROVE_TABLE=FIRST,COUNT cargo test -p tests --test prove table -- --nocapture` prints a row a policy and format.
+//! `POLICYC_PROVE_TABLE=FIRST,COUNT cargo test -p tests --test prove table -- --nocapture` prints a row a policy and format;
+//! `POLICYC_PROVE_TABLE=examples/buck12,tests/fixtures/legs` one of those folders.
 
 use std::time::Instant;
 
 use policy::NumericFormat;
 use prove::{Claim, Eva, Prover, Smt, Verdict};
 
-use super::{task, watched};
+use super::{load, task, watched};
 
 const FORMATS: [NumericFormat; 4] = [
     NumericFormat::F32,
@@ -37,21 +38,29 @@ fn count(claims: &[Claim], verdict: Verdict) -> usize {
     claims.iter().filter(|claim| claim.verdict == verdict).count()
 }
 
+/// What the variable names, and the policy of each.
+fn policies(range: &str) -> Vec<(String, policy::Policy)> {
+    let numbers: Option<Vec<u64>> = range.split(',').map(|word| word.parse().ok()).collect();
+    let Some([first, count]) = numbers.as_deref() else {
+        return range.split(',').map(|path| (path.to_owned(), load(path))).collect();
+    };
+    let random = |seed: u64| {
+        let folder = tests::random::policy(seed).unwrap();
+        (seed.to_string(), policy::load(&folder.path()).unwrap())
+    };
+    (*first..first + count).map(random).collect()
+}
+
 /// Every claim that a prover tried is proved; with the variable alone, since a policy takes half a minute.
 #[test]
 fn a_table_of_random_policies_has_no_open_claim() {
     let Ok(range) = std::env::var("POLICYC_PROVE_TABLE") else {
         return;
     };
-    let (first, number) = range.split_once(',').unwrap();
-    let first: u64 = first.parse().unwrap();
-    let number: u64 = number.parse().unwrap();
     let mut open = Vec::new();
     println!("| seed | format | claims proved | not run | open | Eva s | SMT s | slowest goal |");
     println!("|---|---|---:|---:|---:|---:|---:|---|");
-    for seed in first..first + number {
-        let folder = tests::random::policy(seed).unwrap();
-        let policy = policy::load(&folder.path()).unwrap();
+    for (seed, policy) in policies(&range) {
         for format in FORMATS {
             let start = Instant::now();
             let policy = policy.clone().with_format(format);

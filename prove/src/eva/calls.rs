@@ -83,7 +83,6 @@ impl Writer<'_> {
             runs: BOTH,
             parts: 1,
             assumed: Vec::new(),
-            merged: Vec::new(),
             precisions: COARSE_FIRST,
         }
     }
@@ -201,7 +200,6 @@ impl Writer<'_> {
             runs: BOTH,
             parts: 1,
             assumed: Vec::new(),
-            merged: Vec::new(),
             precisions: COARSE_FIRST,
         }
     }
@@ -259,7 +257,6 @@ impl Writer<'_> {
             runs: ONE_FINITE,
             parts: 1,
             assumed: Vec::new(),
-            merged: self.curves(),
             precisions: self.sums_precisions(),
         })
     }
@@ -310,7 +307,6 @@ impl Writer<'_> {
             runs: if self.is_integer() { ONE } else { BITS_AND_FINITE },
             parts: 1,
             assumed: Vec::from_iter(self.is_integer().then(|| "network".to_owned())),
-            merged: Vec::new(),
             precisions: if self.is_integer() {
                 COARSE_FIRST
             } else {
@@ -337,7 +333,6 @@ impl Writer<'_> {
             runs: ONE,
             parts: 1,
             assumed: vec!["q_values".to_owned()],
-            merged: Vec::new(),
             precisions: COARSE_FIRST,
         }
     }

@@ -9,12 +9,13 @@
 //! They are made from the policy and the numeric contract. Of the generated code they know its interface and, for what needs no
 //! network, the three functions of a step around it.
 
-use policy::{Activation, NumericFormat, Policy};
+use policy::{NumericFormat, Policy};
 
 use super::frama_c::{Machine, Numbers};
 use super::head::{Answer, passes_nan, reads_state};
-use super::invariant::{Invariant, Shown, Word, slices};
+use super::invariant::{Invariant, Shown, Word};
 use super::number::Number;
+use super::slices::slices;
 use super::stated::{Stated, stated};
 use super::text::{Labels, Text};
 
@@ -57,10 +58,22 @@ pub(super) struct Entry {
     pub parts: usize,
     /// Functions of the policy, without its prefix, whose contract stands for their text. Another entry shows the contract.
     pub assumed: Vec<String>,
-    /// Functions of the policy, without its prefix, in which cases are not kept apart.
-    pub merged: Vec<String>,
     /// Frama-C's `-eva-precision`, in the order in which they are tried until one shows everything.
     pub precisions: &'static [u8],
+}
+
+impl Entry {
+    /// The function in which a run of a part begins.
+    pub fn main(&self, part: usize) -> String {
+        main_of(self.function, self.parts, part)
+    }
+}
+
+fn main_of(function: &str, parts: usize, part: usize) -> String {
+    match parts {
+        1 => function.to_owned(),
+        _ => format!("{function}_{part}"),
+    }
 }
 
 /// A file of C and its entries.
@@ -189,7 +202,6 @@ impl Writer<'_> {
             runs: BITS_AND_FINITE,
             parts: 1,
             assumed: vec![if self.is_integer() { "network" } else { "q_values" }.to_owned()],
-            merged: Vec::new(),
             precisions: COARSE_FIRST,
         }
     }
@@ -253,7 +265,6 @@ impl Writer<'_> {
             runs: if self.takes_output_as_it_is() { BOTH } else { STEP },
             parts: 1,
             assumed: std::iter::once(ACTION.to_owned()).chain(self.flips()).collect(),
-            merged: Vec::new(),
             precisions: match self.answer() {
                 // the law multiplies what the state holds
                 Answer::Gains(_) if self.policy.head.schedule().is_some() => FINE,
@@ -304,7 +315,6 @@ impl Writer<'_> {
             runs: BOTH,
             parts: 1,
             assumed: vec![ACTION.to_owned()],
-            merged: Vec::new(),
             precisions: FINE,
         }
     }
@@ -321,14 +331,14 @@ impl Writer<'_> {
             let Some(word) = self.invariant.memory_word(index).cloned() else {
                 continue;
             };
-            let (Shown::InSlices { gain }, Some((_, bound))) = (word.shown, word.ends) else {
+            let (Shown::InSlices { gain, input }, Some((_, bound))) = (word.shown, word.ends) else {
                 continue;
             };
             let behind = words.iter().enumerate();
             let kept = behind.filter(|(_, other)| **other == word || other.shown == Shown::WithSlicesOf(index));
             let kept: Vec<(usize, Word)> = kept.map(|(at, other)| (at, other.clone())).collect();
             let first = (format!("{} at the first sample", word.name), FIRST);
-            let Some(ends) = slices(bound, gain) else {
+            let Some(ends) = slices(bound, input, gain) else {
                 self.not_stated
                     .extend(kept.into_iter().map(|(_, word)| (word.name, WHY)));
                 continue;
@@ -352,21 +362,16 @@ impl Writer<'_> {
         if calls.is_empty() {
             return None;
         }
-        self.text.lines([
-            "void prove_slices(void)",
-            "{",
-            "sound(&any_sound);",
-            "measure(&any_measured);",
-        ]);
-        self.any_command("any_command");
         // side by side: the time of a run is that of its slices
         let parts = calls.len().div_ceil(PART).min(MOST_PARTS);
         for (part, calls) in calls.chunks(calls.len().div_ceil(parts)).enumerate() {
-            self.text.line(format!("#if PART == {part}"));
+            self.text
+                .line(format!("void {}(void)", main_of("prove_slices", parts, part)));
+            self.text.lines(["{", "sound(&any_sound);", "measure(&any_measured);"]);
+            self.any_command("any_command");
             self.text.lines(calls.iter());
-            self.text.line("#endif");
+            self.close();
         }
-        self.close();
         Some(Entry {
             function: "prove_slices",
             about: "commit from every sound state, in slices of the memories of low-pass filters, every measurement and command",
@@ -377,7 +382,6 @@ impl Writer<'_> {
             runs: ONE,
             parts,
             assumed: vec![ACTION.to_owned()],
-            merged: Vec::new(),
             precisions: COARSE_FIRST,
         })
     }
@@ -406,19 +410,6 @@ impl Writer<'_> {
             self.keeps("slices", *at, other);
         }
         self.text.lines(["}", ""]);
-    }
-
-    /// The curves of a network in integers that are computed piece by piece.
-    pub fn curves(&self) -> Vec<String> {
-        let all = self.policy.layers.iter().map(|layer| layer.activation);
-        let mut words: Vec<&str> = all
-            .filter(|activation| activation.curve().is_some() && activation.range().is_none())
-            .map(Activation::word)
-            .collect();
-        words.sort_unstable();
-        words.dedup();
-        let integer = words.into_iter().filter(|_| self.is_integer());
-        integer.map(|word| format!("{word}_integer")).collect()
     }
 
     /// Whether the network computes in integers.

@@ -1,6 +1,6 @@
 //! One run of Frama-C: its command line, and what it says.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -91,6 +91,64 @@ pub(super) fn analyse(analysis: Analysis<'_>, stop: &Stop) -> Result<Found, prog
     Ok(found)
 }
 
+/// Frama-C with what is needed of it, in a folder.
+fn frama_c(folder: &Path) -> Command {
+    let mut command = Command::new(PROGRAM);
+    // its own temporary files go with the folder, also when it is killed
+    command.current_dir(folder).env("TMPDIR", folder);
+    // it takes the folder from there
+    command.env("PWD", folder);
+    // all plugins together take longer to load than a small driver to analyse; without `inout` Eva does not know what a call reads, and
+    // analyses the same call again
+    command.args(["-no-autoload-plugins", "-load-module", "inout,eva,report"]);
+    command
+}
+
+/// Where the syntax tree of the driver is kept.
+fn tree(folder: &Path, machine: Machine, numbers: Numbers) -> PathBuf {
+    folder.join(format!("{}-{numbers:?}.sav", machine.0))
+}
+
+/// What reads the driver and the generated C.
+fn source(command: &mut Command, policy: &str, machine: Machine, numbers: Numbers) {
+    command.args([FILE, "-machdep", machine.0]);
+    let finite = match numbers {
+        Numbers::Any => "",
+        Numbers::Finite => " -DFINITE",
+    };
+    // without __GNUC__ the portable text is taken; the two flags keep the preprocessor from announcing excess precision
+    command.arg(format!(
+        "-cpp-extra-args=-U__GNUC__ -D{}_PORTABLE -msse2 -mfpmath=sse{finite} -I.",
+        policy.to_uppercase()
+    ));
+}
+
+/// Reads the driver once for all runs on a machine with such numbers, for reading takes as long as analysing a small entry. If this
+/// fails, each run reads for itself and says why it cannot.
+///
+/// # Errors
+/// If the user has had enough.
+pub(super) fn read_once(
+    folder: &Path,
+    policy: &str,
+    (machine, numbers): (Machine, Numbers),
+    stop: &Stop,
+) -> Result<(), program::Stopped> {
+    let tree = tree(folder, machine, numbers);
+    let mut command = frama_c(folder);
+    source(&mut command, policy, machine, numbers);
+    command.arg("-save").arg(&tree);
+    match program::run(&mut command, PATIENCE, stop) {
+        Ok(output) if output.status.success() => Ok(()),
+        Err(program::Failed::Stopped) => Err(program::Stopped),
+        Ok(_) | Err(program::Failed::Io(_)) => {
+            // half a tree is none; what is not there need not be removed
+            let _ = std::fs::remove_file(&tree);
+            Ok(())
+        }
+    }
+}
+
 /// One run of Frama-C, which writes its findings to `table`.
 fn command(analysis: Analysis<'_>, precision: u8, table: &Path) -> Command {
     let Analysis {
@@ -101,29 +159,18 @@ fn command(analysis: Analysis<'_>, precision: u8, table: &Path) -> Command {
         part,
         ..
     } = analysis;
-    let Entry {
-        function: entry,
-        assumed,
-        merged,
-        ..
-    } = analysis.entry;
-    let (finite, special) = match numbers {
-        Numbers::Any => ("", "none"),
-        Numbers::Finite => (" -DFINITE", "non-finite"),
+    let mut command = frama_c(folder);
+    let tree = tree(folder, machine, numbers);
+    if tree.exists() {
+        command.arg("-load").arg(tree);
+    } else {
+        source(&mut command, policy, machine, numbers);
+    }
+    command.arg("-eva").arg("-main").arg(analysis.entry.main(part));
+    let special = match numbers {
+        Numbers::Any => "none",
+        Numbers::Finite => "non-finite",
     };
-    let mut command = Command::new(PROGRAM);
-    // its own temporary files go with the folder, also when it is killed
-    command.current_dir(folder).env("TMPDIR", folder);
-    // it takes the folder from there
-    command.env("PWD", folder);
-    // all plugins together take longer to load than a small driver to analyse
-    command.args(["-no-autoload-plugins", "-load-module", "eva,report"]);
-    command.args(["-eva", FILE, "-main", entry, "-machdep", machine.0]);
-    // without __GNUC__ the portable text is taken; the two flags keep the preprocessor from announcing excess precision
-    command.arg(format!(
-        "-cpp-extra-args=-U__GNUC__ -D{}_PORTABLE -msse2 -mfpmath=sse{finite} -DPART={part} -I.",
-        policy.to_uppercase()
-    ));
     command.args(["-warn-special-float", special]);
     // loops have up to 1024 turns (the width of a layer), and every one is to be seen apart
     command.args([
@@ -139,15 +186,10 @@ fn command(analysis: Analysis<'_>, precision: u8, table: &Path) -> Command {
             .arg("-eva-split-return-function")
             .arg(format!("{policy}_{function}:full"));
     }
-    // the pieces of a curve are there for its value, not to be kept apart behind it
-    let curves = merged
-        .iter()
-        .map(|name| format!(",{policy}_{name}:0"))
-        .collect::<String>();
     command
         .arg("-eva-slevel-function")
-        .arg(format!("{policy}_guard:0,{policy}_sense:0{curves}"));
-    for function in assumed {
+        .arg(format!("{policy}_guard:0,{policy}_sense:0"));
+    for function in &analysis.entry.assumed {
         command.arg("-eva-use-spec").arg(format!("{policy}_{function}"));
     }
     command.args(["-eva-no-show-progress", "-eva-msg-key=-initial-state,-final-states"]);

@@ -17,6 +17,7 @@ impl Writer<'_> {
             String::new(),
         ]);
         self.network_contract();
+        self.curve_contracts();
         self.text.lines([
             "/* every bit pattern of the type */".to_owned(),
             format!("extern volatile {kind} any_bits;"),

@@ -5,6 +5,8 @@
 use interp::{Controller, Real};
 use policy::{Filter, Policy, Scalar};
 
+use super::slices::{Ends, source};
+
 /// How it is shown that a step leaves a number within its ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Shown {
@@ -15,6 +17,8 @@ pub(super) enum Shown {
     InSlices {
         /// k in binary64.
         gain: f64,
+        /// Where x lies, if more is known of it than how large it is.
+        input: Option<Ends>,
     },
     /// In the same slices, those of this word.
     WithSlicesOf(usize),
@@ -108,7 +112,7 @@ fn memories(policy: &Policy) -> Vec<Shown> {
     let mut all = vec![Shown::Directly; observed];
     for feature in &policy.features {
         let mut behind = Shown::Directly;
-        for filter in &feature.filters {
+        for (index, filter) in feature.filters.iter().enumerate() {
             let first = all.len();
             match *filter {
                 Filter::Delay { samples } => all.extend(std::iter::repeat_n(behind, samples)),
@@ -120,6 +124,8 @@ fn memories(policy: &Policy) -> Vec<Shown> {
                     let own = match behind {
                         Shown::Directly => Shown::InSlices {
                             gain: policy.sample_period / (time_constant + policy.sample_period),
+                            // of what another filter remembers only the magnitude is known
+                            input: (index == 0).then(|| source(&feature.source, policy)),
                         },
                         Shown::InSlices { .. } | Shown::WithSlicesOf(_) => Shown::ByContract(CHAIN),
                         Shown::ByContract(why) => Shown::ByContract(why),
@@ -146,74 +152,9 @@ fn memories(policy: &Policy) -> Vec<Shown> {
     all
 }
 
-/// Largest number of slices of a word on either side of 0; with so many all its runs together take a quarter of a minute.
-const MOST_SLICES: usize = 160;
-
-/// The ends of slices from -bound to bound, ascending; `None` where too many would be needed.
-///
-/// A slice from `lo` to `hi` is kept by `y + k(x - y)` with `|x| <= X` if `hi + k(X - lo) <= M`. With `D = M - lo` and
-/// `d = M - hi` that is `d >= k(D - (M - X))`: so the distance to the end may shrink by k from slice to slice, and by more
-/// near the end.
-pub(super) fn slices(bound: f64, gain: f64) -> Option<Vec<f64>> {
-    // M exceeds X by 2^-19 of itself (contract section 1). A quarter of that is room: the ends of slices are rounded outwards, by a
-    // 32nd each in binary32, and what is multiplied and subtracted to nearest
-    let excess = bound / f64::from(1 << 19);
-    let (used, rounded) = (0.75 * excess, excess / 16.0);
-    let mut distances = Vec::new();
-    let mut distance = bound;
-    while distance > used {
-        distances.push(distance);
-        if distances.len() > MOST_SLICES {
-            return None;
-        }
-        // beyond 8 few slices are saved
-        distance = (gain * (distance - used) + rounded).max(distance / 8.0);
-    }
-    distances.push(distance);
-    let upper = distances.iter().map(|distance| bound - distance).chain([bound]);
-    let upper: Vec<f64> = upper.collect();
-    let lower = upper.iter().rev().map(|end| -end);
-    // 0 once
-    Some(lower.chain(upper.iter().skip(1).copied()).collect())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn slices_cover_the_whole_range_in_order() {
-        let ends = slices(3.0, 0.1).expect("few");
-        assert_eq!((ends[0], ends[ends.len() - 1]), (-3.0, 3.0));
-        assert!(ends.windows(2).all(|pair| pair[0] < pair[1]), "{ends:?}");
-        assert!(ends.len() < 25, "{}", ends.len());
-        assert_eq!(slices(3.0, 0.9999), None);
-    }
-
-    /// By the rule in binary64: from the slice one step stays within the bound.
-    #[test]
-    fn every_slice_is_kept() {
-        // with 0.99 too many would be needed, which is said instead
-        assert_eq!(slices(100.0, 0.99), None);
-        for gain in [0.001, 0.02, 0.1, 0.12, 0.13, 0.3, 0.5, 0.8, 0.9, 0.93] {
-            // X from M as in section 1
-            let (bound, growth) = (100.0, 1.0 + 1.0 / 1_048_576.0);
-            let most = bound / growth / growth;
-            let ends = slices(bound, gain).expect("few");
-            for pair in ends.windows(2) {
-                // ends as binary32 has them, outwards
-                let low = f64::from((pair[0] as f32).next_down()).max(-bound);
-                let high = f64::from((pair[1] as f32).next_up()).min(bound);
-                // with what the difference, the product and the gain are rounded by
-                let rounded = 1.0 + 3.0 / f64::from(1 << 24);
-                // the bound is a number of the format, so what is not above it is not rounded above it
-                let next = high + gain * (most - low) * rounded;
-                assert!(next <= bound, "{gain} {pair:?} {next}");
-                let next = low - gain * (most + high) * rounded;
-                assert!(next >= -bound, "{gain} {pair:?} {next}");
-            }
-        }
-    }
 
     #[test]
     fn words_of_filters_behind_those_of_observers_are_shown_as_filters() {

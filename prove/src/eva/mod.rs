@@ -2,12 +2,14 @@
 
 mod calls;
 mod command;
+mod curves;
 mod driver;
 mod frama_c;
 mod head;
 mod inputs;
 mod invariant;
 mod number;
+mod slices;
 mod stated;
 mod text;
 
@@ -176,7 +178,7 @@ fn jobs(driver: &Driver) -> Vec<Job<'_>> {
     jobs
 }
 
-/// Runs side by side, as many as there are cores.
+/// All runs, behind one that reads the driver for each machine and kind of numbers.
 fn run_all(
     folder: &Path,
     task: Task<'_>,
@@ -184,51 +186,74 @@ fn run_all(
     jobs: &[Job<'_>],
     watch: &Watch<'_>,
 ) -> Result<Vec<Found>, Stopped> {
+    let policy = task.policy;
+    let mut readings: Vec<(Machine, Numbers)> = Vec::new();
+    for reading in jobs.iter().map(|job| (job.machine, job.numbers)) {
+        if !readings.contains(&reading) {
+            readings.push(reading);
+        }
+    }
+    (watch.say)(Next::first("reading the driver"));
+    side_by_side(&readings, |_, reading| {
+        frama_c::read_once(folder, &policy.name, *reading, watch.stop)
+    })?;
+    side_by_side(jobs, |index, job| {
+        let what = format!(
+            "{} in {}: {} on {}, {} ({} of {})",
+            policy.name,
+            policy.numeric_format.name(),
+            job.entry.function,
+            job.machine.0,
+            job.numbers.name(),
+            index + 1,
+            jobs.len()
+        );
+        (watch.say)(Next {
+            what: &what,
+            done: index,
+            all: jobs.len(),
+        });
+        let analysis = Analysis {
+            folder,
+            policy: &policy.name,
+            labels,
+            entry: job.entry,
+            machine: job.machine,
+            numbers: job.numbers,
+            part: job.part,
+        };
+        frama_c::analyse(analysis, watch.stop)
+    })
+}
+
+/// Does it for each, as many at a time as there are cores; the answers in the order of the items.
+fn side_by_side<T: Sync, R: Send + Clone>(
+    items: &[T],
+    run: impl Fn(usize, &T) -> Result<R, Stopped> + Sync,
+) -> Result<Vec<R>, Stopped> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let next = AtomicUsize::new(0);
-    let results = Mutex::new(vec![None; jobs.len()]);
-    let policy = task.policy;
+    let results = Mutex::new(vec![None; items.len()]);
     std::thread::scope(|scope| {
-        for _ in 0..cores.min(jobs.len()) {
+        for _ in 0..cores.min(items.len()) {
             scope.spawn(|| {
-                while let Some((index, job)) = {
+                while let Some((index, item)) = {
                     let index = next.fetch_add(1, Ordering::Relaxed);
-                    jobs.get(index).map(|job| (index, job))
+                    items.get(index).map(|item| (index, item))
                 } {
-                    let what = format!(
-                        "{} in {}: {} on {}, {} ({} of {})",
-                        policy.name,
-                        policy.numeric_format.name(),
-                        job.entry.function,
-                        job.machine.0,
-                        job.numbers.name(),
-                        index + 1,
-                        jobs.len()
-                    );
-                    (watch.say)(Next {
-                        what: &what,
-                        done: index,
-                        all: jobs.len(),
-                    });
-                    let analysis = Analysis {
-                        folder,
-                        policy: &policy.name,
-                        labels,
-                        entry: job.entry,
-                        machine: job.machine,
-                        numbers: job.numbers,
-                        part: job.part,
-                    };
-                    let found = frama_c::analyse(analysis, watch.stop);
+                    let result = run(index, item);
                     let mut results = results.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                    results[index] = Some(found);
+                    results[index] = Some(result);
                 }
             });
         }
     });
     let results = results.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
     // every index below the count was taken by a thread
-    results.into_iter().map(|found| found.unwrap_or(Err(Stopped))).collect()
+    results
+        .into_iter()
+        .map(|result| result.unwrap_or(Err(Stopped)))
+        .collect()
 }
 
 /// A claim that was shown with a contract in the place of a function holds if that contract was shown.

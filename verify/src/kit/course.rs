@@ -175,9 +175,12 @@ impl<'a, T: Real> Course<'a, T> {
                 continue;
             }
             let nearby: [fn(Scalar, f64) -> f64; 3] = [|_, x| x, Scalar::next_down, Scalar::next_up];
+            let before = self.steps_to_a_cap(output, &usual)?;
             for near in nearby {
                 self.play(Event::Init)?;
-                self.play(Event::Step(usual.clone()))?;
+                for _ in 0..before {
+                    self.play(Event::Step(usual.clone()))?;
+                }
                 let duty = self.oracle.controller().eval(&usual)?.decision(output).slewed;
                 let cap = Some(T::nearest(near(scalar, duty.to_f64())));
                 self.put(|state| {
@@ -188,6 +191,25 @@ impl<'a, T: Real> Course<'a, T> {
             }
         }
         Ok(())
+    }
+
+    /// After how many steps from a fresh start the duty is one that a cap of the soft start can be: a lower one is not sound.
+    fn steps_to_a_cap(&self, output: usize, usual: &[Sample]) -> Result<usize, InputError> {
+        let limits = self.policy.paths().get(output).map(|path| path.limits);
+        let from = limits.and_then(|limits| Some((limits.soft_start?.from, limits.duty.high)));
+        let Some((from, high)) = from else { return Ok(1) };
+        // one step first: a fresh start alone holds the initial duty
+        for steps in [1, 0, 2, 3] {
+            let mut ahead = Controller::<T>::new(self.policy);
+            for _ in 0..steps {
+                ahead.step(usual)?;
+            }
+            let duty = ahead.eval(usual)?.decision(output).slewed.to_f64();
+            if from < duty && duty < high {
+                return Ok(steps);
+            }
+        }
+        Ok(1)
     }
 
     /// Measurements at which two actions of an output have exactly the same, highest value: the lower index is to win.

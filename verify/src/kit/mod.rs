@@ -297,9 +297,9 @@ mod tests {
         );
     }
 
-    /// A trace that never clips or falls back would check less than it says.
+    /// A trace that never clips or falls back would check less than it says. Each action wins in moves that are looked for: `sides`.
     #[test]
-    fn the_moves_of_the_suite_reach_every_status_and_action() {
+    fn the_random_moves_of_the_suite_reach_every_status() {
         let constructs = constructs().unwrap();
         let mut oracle = Oracle::<f32>::new(&constructs);
         let mut stream = Stream::new(&constructs, SEED, &[]);
@@ -310,10 +310,6 @@ mod tests {
             // no move damages a state
             assert_eq!(*count == 0, bit == damaged, "bit {bit}: {coverage:?}");
         }
-        assert!(
-            coverage.actions.iter().filter(|count| **count > 0).count() >= 4,
-            "{coverage:?}"
-        );
         assert!(coverage.resets > 0 && coverage.inits > 0, "{coverage:?}");
         assert!(
             coverage.mappings_accepted > 0 && coverage.mappings_refused > 0,

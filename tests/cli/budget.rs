@@ -61,7 +61,7 @@ fn what_is_left_of_the_period_behind_the_sample_counts() {
     );
     // where half of it is too little, the way to the whole is said
     desk.write("plant.toml", &plant("0.5"));
-    let missed = desk.succeed("compile policy --target cortex-m4f --clock 1MHz --plant plant.toml --out out");
+    let missed = desk.succeed("compile policy --target cortex-m4f --clock 7MHz --plant plant.toml --out out");
     assert!(
         missed.contains("trained again with pwm.sampling_phase = 0 and pwm.duty_delay = 1"),
         "{missed}"

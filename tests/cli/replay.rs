@@ -218,7 +218,7 @@ fn replay_takes_previous_duty_from_the_log() {
     );
     desk.succeed("replay buck12 log.csv --exploring");
     desk.write("log.csv", &log("duty", &duties, &|k| 10.0 * (before(k) - 0.5)));
-    desk.succeed("replay buck12 log.csv");
+    desk.succeed("replay buck12 log.csv --exploring");
     // the log begins in mid-run: its first duty is not that of the contract
     desk.write("log.csv", &log("previous_duty", &duties, &|k| 10.0 * (duties(k) - 0.5)));
     let said = desk.type_in("replay buck12 log.csv");

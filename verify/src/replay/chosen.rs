@@ -42,18 +42,29 @@ pub(super) fn chosen(path: &DutyPath<'_>, duties: &[f64], name: &str) -> (Option
             table.len()
         ));
     }
+    let far = |action: usize, duty: f64| table.get(action).map_or(f64::INFINITY, |own| (own - duty).abs());
     let nearest = |duty: f64| {
-        let far = |action: &usize| table.get(*action).map_or(f64::INFINITY, |own| (own - duty).abs());
-        (0..table.len()).min_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(0)
+        (0..table.len())
+            .min_by(|a, b| far(*a, duty).total_cmp(&far(*b, duty)))
+            .unwrap_or(0)
     };
-    let mut taken: Vec<usize> = values.iter().map(|value| nearest(*value)).collect();
-    taken.dedup();
-    if taken.len() < values.len() {
+    let mut ranked: Vec<usize> = (0..table.len()).collect();
+    ranked.sort_by(|a, b| table[*a].total_cmp(&table[*b]));
+    // where all occur the order tells more than the distance: a duty that is wrong in the contract may be nearer to its neighbour
+    let taken: Vec<usize> = match values.len() == table.len() {
+        true => ranked,
+        false => values.iter().map(|value| nearest(*value)).collect(),
+    };
+    if taken.windows(2).any(|pair| pair[0] == pair[1]) {
         return unsaid("for two of its values are nearest to one duty of the contract");
     }
-    let actions = duties.iter().map(|duty| nearest(*duty) as u32).collect();
+    let action = |duty: &f64| {
+        let place = values.partition_point(|value| *value < duty - ONE * largest);
+        taken.get(place).map_or(0, |action| *action as u32)
+    };
+    let actions = duties.iter().map(action).collect();
     let text = format!(
-        "the action of a row is the one whose duty is nearest to `{name}`: the log has no column `{}`",
+        "the action of a row is the one whose duty comes nearest to `{name}`: the log has no column `{}`",
         path.named("action")
     );
     (Some(actions), Some(text))

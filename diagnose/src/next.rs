@@ -1,6 +1,6 @@
 //! Which experiment would separate what the records cannot.
 
-use plant::Load;
+use plant::{Load, Topology};
 use serde::Serialize;
 
 use crate::attribute::Attribution;
@@ -12,6 +12,7 @@ use crate::played::{FOLDER, Played};
 use crate::problem::Problem;
 use crate::progress::{Listener, Progress};
 use crate::record::{CHANNELS, Record};
+use crate::words::si;
 
 /// Rows of a planned experiment: 30 ms at 10 kHz, nine periods of the paper's filter, as long as the records of the blind cases.
 const ROWS: usize = 300;
@@ -50,7 +51,12 @@ pub fn experiments(problem: &Problem, attribution: &Attribution, say: Listener<'
         return Vec::new();
     }
     say(Progress::Stage("next experiment"));
-    let plans = plans(problem);
+    let mut plans = plans(problem);
+    plans.retain_mut(|planned| {
+        let [v, i] = largest(&planned.record, &best.state.model);
+        planned.words += &format!(", up to {} and {} by the model", si(v, "V"), si(i, "A"));
+        is_borne(problem, [v, i])
+    });
     let name = |causes: &[usize]| {
         causes
             .iter()
@@ -128,6 +134,33 @@ fn played(problem: &Problem, record: &Record) -> Played {
     }
 }
 
+/// How much more than the records show an experiment may ask of a bench, in voltage and in current: what its sizes are chosen for, 1.4 and 2
+/// times the typical ones, with an overshoot of a third and of a filter that nothing damps.
+const MORE: [f64; 2] = [1.8, 4.0];
+
+/// Largest output voltage and inductor current at the sampling instants of an experiment.
+fn largest(record: &Record, model: &Model) -> [f64; 2] {
+    let made = Problem::new(vec![record.clone()], model.clone());
+    let starts = made.first_starts();
+    let shown = crate::drive::simulate(model, &made.records[0], &starts.of(0));
+    [0, 1].map(|n| shown.iter().map(|row| row[n].abs()).fold(0.0, f64::max))
+}
+
+/// Whether it asks no more than that of a bench, as far as the records say what it has borne.
+fn is_borne(problem: &Problem, largest: [f64; 2]) -> bool {
+    let seen = |n: usize| {
+        let values = problem.records.iter().flat_map(|record| &record.measured[n]);
+        values
+            .copied()
+            .filter(|v| v.is_finite())
+            .map(f64::abs)
+            .fold(0.0, f64::max)
+    };
+    // without a column the typical size stands for it
+    let seen = [seen(0).max(problem.bases.v), seen(1).max(problem.bases.i)];
+    (0..2).all(|n| largest[n] <= MORE[n] * seen[n])
+}
+
 /// Measured with one model, fitted with the other.
 fn separation(problem: &Problem, record: &Record, one: &Model, other: &Model) -> f64 {
     let mut made = Problem::new(vec![record.clone()], one.clone());
@@ -198,8 +231,10 @@ fn plans(problem: &Problem) -> Vec<Planned> {
     let (v, i, v_in) = (problem.bases.v, problem.bases.i, problem.bases.v_in);
     // sizes of the plans are conventions: steps as large as a bench takes without leaving continuous conduction (but
     // for the light load), and a PRBS small enough that the response stays linear
-    let d = (v / v_in).clamp(0.1, 0.9);
-    let (low, high, ohms) = (0.6 * d, 1.4 * d, v / i);
+    let topology = problem.base.plant.converter.topology;
+    let duty_for = |share: f64| duty_for(topology, share * v, v_in).clamp(0.02, 0.9);
+    let d = duty_for(1.0).max(0.1);
+    let (low, high, ohms) = (duty_for(0.6), duty_for(1.4), v / i);
     let (few, many) = (0.3 * v * i, 1.2 * v * i);
     let none = Still(0.0);
     let rows = [
@@ -230,7 +265,7 @@ fn plans(problem: &Problem) -> Vec<Planned> {
         (
             "light-load",
             format!("light load: {:.0} ohm at duty {d:.2}, with duty steps", 10.0 * ohms),
-            Stair(0.8 * d, 1.2 * d),
+            Stair(duty_for(0.8), duty_for(1.2)),
             (0.1, none, none),
         ),
         (
@@ -265,6 +300,15 @@ fn plans(problem: &Problem) -> Vec<Planned> {
         v_in_ratio: 0.5,
     });
     list.into_iter().map(|plan| planned(problem, plan)).collect()
+}
+
+/// The duty at which a loss-free converter has `v` at its output.
+fn duty_for(topology: Topology, v: f64, v_in: f64) -> f64 {
+    match topology {
+        Topology::Buck => v / v_in,
+        Topology::Boost => 1.0 - v_in / v,
+        Topology::BuckBoost => v / (v + v_in),
+    }
 }
 
 fn planned(problem: &Problem, plan: Plan) -> Planned {
@@ -305,5 +349,21 @@ fn planned(problem: &Problem, plan: Plan) -> Planned {
         name: plan.name,
         words: plan.words,
         record,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By the balance of the inductor's voltage over a period, `d v_on = (1 - d) v_off`.
+    #[test]
+    fn the_duty_of_an_experiment_is_that_of_its_converter() {
+        let (v_in, v) = (12.0, 30.0);
+        let boost = duty_for(Topology::Boost, v, v_in);
+        assert!((boost * v_in - (1.0 - boost) * (v - v_in)).abs() < 1e-9, "{boost}");
+        let inverting = duty_for(Topology::BuckBoost, v, v_in);
+        assert!((inverting * v_in - (1.0 - inverting) * v).abs() < 1e-9, "{inverting}");
+        assert_eq!(duty_for(Topology::Buck, 3.0, v_in), 0.25);
     }
 }

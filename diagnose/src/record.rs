@@ -5,6 +5,7 @@ mod captured;
 mod channels;
 mod clipped;
 mod digits;
+mod edges;
 mod levels;
 mod logged;
 mod raw;

@@ -126,6 +126,15 @@ impl Sheet {
 }
 
 impl Sheet {
+    /// A column that nobody asked for and that has one of a quantity's names up to case and punctuation: `vo` for `v_o`.
+    #[must_use]
+    pub fn nearly<'a>(&'a self, located: &Located, quantity: &Quantity<'_>) -> Option<&'a str> {
+        let names: Vec<String> = quantity.names().map(plain).collect();
+        let unused = located.unused.iter().filter_map(|index| self.columns().get(*index));
+        let mut headers = unused.map(|column| column.name.as_str());
+        headers.find(|header| names.contains(&plain(header)))
+    }
+
     /// A column that is called like a quantity.
     pub(crate) fn resembling(&self, quantity: &str) -> Option<&str> {
         let (_, synonyms) = SYNONYMS.iter().find(|(name, _)| *name == quantity)?;
@@ -227,7 +236,7 @@ mod tests {
     use std::path::Path;
 
     use super::{plain, proposal};
-    use crate::{ColumnMap, Options, Sheet, VOCABULARY};
+    use crate::{ColumnMap, Options, Quantity, Sheet, VOCABULARY};
 
     fn proposed(header: &str) -> Option<String> {
         let text = format!("{header}\n{}\n", vec!["1"; header.split(';').count()].join(";"));
@@ -248,6 +257,22 @@ mod tests {
         ] {
             assert_eq!(plain(header), expected, "{header}");
         }
+    }
+
+    /// A policy has signals of its own, which no list knows.
+    #[test]
+    fn a_name_that_differs_in_punctuation_alone_is_near() {
+        let text = b"vo,I-L,io2,k\n1,2,3,4\n".to_vec();
+        let sheet = Sheet::parse(Path::new("a.csv"), text, &Options::default()).unwrap();
+        let quantity = |name| Quantity {
+            name,
+            aliases: &[],
+            unit: "",
+        };
+        let wanted = ["v_o", "i_l", "i_o"].map(quantity);
+        let located = sheet.locate(&wanted, &ColumnMap::default()).unwrap();
+        let found = wanted.each_ref().map(|quantity| sheet.nearly(&located, quantity));
+        assert_eq!(found, [Some("vo"), Some("I-L"), None]);
     }
 
     #[test]

@@ -214,13 +214,17 @@ impl Quantity<'_> {
     }
 }
 
-/// A name and the unit in brackets, behind a stroke or as a percent sign: `v_out [mV]`, `i_l/A`, `duty (%)`, `d%`.
+/// A name and the unit in brackets, behind a stroke or as a percent sign: `v_out [mV]`, `i_l/A`, `duty (%)`, `d%`. A number is no unit.
 pub(crate) fn split_unit(header: &str) -> (&str, Option<&str>) {
     let header = header.trim();
     match header.find(['[', '(', '/', '%']) {
         // a sign at the start is all of the name: `%` alone measures nothing
         Some(start) if start > 0 => {
             let unit = header[start..].trim_matches(|c: char| c == ' ' || "[]()/".contains(c));
+            // an index is part of the name: `obs[0]`
+            if !unit.is_empty() && unit.chars().all(|c| c.is_ascii_digit()) {
+                return (header, None);
+            }
             (header[..start].trim_end_matches([' ', '_']), Some(unit))
         }
         _ => (header, None),

@@ -96,6 +96,28 @@ fn replay_of_a_log_that_the_contract_explains_is_equal_to_the_last_feature() {
     );
 }
 
+/// As arrays are written: an index in brackets is no unit, `ep` is the episode, and a column that may be the choice is asked for.
+#[test]
+fn replay_reads_the_names_that_an_array_gives() {
+    let own = table(&environment()).replacen("episode", "ep", 1);
+    let own = (0..6).fold(own, |text, n| {
+        text.replacen(&format!("obs_{n}"), &format!("obs[{n}]"), 1)
+    });
+    let lines = own.lines().enumerate();
+    let with: Vec<String> = lines
+        .map(|(n, line)| format!("{line},{}", if n == 0 { "a" } else { "0" }))
+        .collect();
+    let desk = desk(&environment());
+    desk.write("log.csv", &(with.join("\n") + "\n"));
+    let ran = desk.type_in("replay buck12 log.csv");
+    assert!(
+        ran.code == Some(0) && ran.stdout.contains("equal: all 6 features") && ran.stdout.contains("2 episodes"),
+        "{}",
+        ran.stdout
+    );
+    assert!(ran.stderr.contains("--map action=a"), "{}", ran.stderr);
+}
+
 #[test]
 fn replay_names_sign_scale_offset_and_clip() {
     let line = said_of(0, "e", |rows, k| -rows[k].observation[0]);

@@ -36,9 +36,12 @@ pub fn lines(
         "budget of {} in {}:{}",
         policy.name,
         policy.numeric_format.name(),
-        soonest.map_or_else(String::new, |(build, budget)| format!(" {} ({build})", at_best(budget)))
+        soonest.map_or_else(String::new, |(build, _)| {
+            let found: Vec<Fit> = budgets.iter().map(|(_, budget)| budget.fit).collect();
+            format!(" {}; soonest done: {build}", in_short(&found))
+        })
     )];
-    lines.extend(budgets.iter().map(|(build, budget)| budget.text(build)));
+    lines.extend(budgets.iter().map(|(build, budget)| budget.text(build, clock.slot)));
     if budgets.is_empty() {
         lines.push(match target.cycles {
             None => unmodelled(policy, target, outputs, costs, clock)?,
@@ -92,12 +95,14 @@ pub fn lines(
     Ok(lines)
 }
 
-/// The verdict on the build that is done first.
-fn at_best(budget: &Budget) -> &'static str {
-    match budget.fit {
-        Fit::Met => "met at best",
-        Fit::Doubtful => "in doubt at best",
-        Fit::Missed => "NOT met, not even at best",
+/// The verdict on all builds in a few words.
+fn in_short(found: &[Fit]) -> String {
+    let met = found.iter().filter(|fit| **fit == Fit::Met).count();
+    match met {
+        0 if found.contains(&Fit::Doubtful) => "in doubt in the best build".to_owned(),
+        0 => "NOT met in any build".to_owned(),
+        met if met == found.len() => "met in every build".to_owned(),
+        met => format!("met in {met} of {} builds", found.len()),
     }
 }
 

@@ -179,7 +179,7 @@ impl Budget {
 
     /// One line for the build of this name.
     #[must_use]
-    pub fn text(&self, build: &str) -> String {
+    pub fn text(&self, build: &str, slot: Slot) -> String {
         let (least, most) = (100.0 * self.share.0, 100.0 * self.share.1);
         let period = grouped(self.period_cycles as u64);
         let clock = Clock::shown(self.clock_hz);
@@ -199,12 +199,19 @@ impl Budget {
                 "met; {:.0} % of that is left for everything else at the worst",
                 100.0 - most
             ),
+            // a duty that acts a period later leaves all of it, wherever the sample is
+            Fit::Met if slot == Slot::Later => {
+                format!(
+                    "met; {:.0} % of the period is left for everything else at the worst",
+                    100.0 - most
+                )
+            }
             Fit::Met => format!(
                 "met, {}; {:.0} % of the period is left for everything else at the worst",
                 self.half(),
                 100.0 - most
             ),
-            Fit::Doubtful if is_whole => {
+            Fit::Doubtful if is_whole && slot != Slot::Later => {
                 format!(
                     "in doubt, {}: the model's fewest cycles fit, its most do not",
                     self.half()
@@ -286,11 +293,15 @@ mod tests {
         assert_eq!(half((4_000, 5_002)).fit, Fit::Doubtful);
         assert!(
             half((2_000, 2_500))
-                .text("gcc")
+                .text("gcc", Slot::Behind(0.5))
                 .contains("the 50 % of the control period behind the sample: met; 50 % of that is left")
         );
         // what leaves less than interrupt entry takes leaves nothing
-        let text = |cycles| Budget::of(&costs(Some(cycles)), at(1e8), 1e-4).unwrap().text("gcc");
+        let text = |cycles| {
+            Budget::of(&costs(Some(cycles)), at(1e8), 1e-4)
+                .unwrap()
+                .text("gcc", Slot::Unknown)
+        };
         assert!(text((5_000, 9_950)).contains("nothing left"));
         assert!(text((5_000, 9_800)).contains("met, half of it in doubt; 2 % of the period is left"));
         assert!(text((5_100, 9_800)).contains("met, half of it NOT; 2 % of the period is left"));

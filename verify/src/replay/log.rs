@@ -123,6 +123,7 @@ impl Log {
             }
         }
         notes.extend(unread_duty(&sheet, &located, &names));
+        notes.extend(unread_action(policy, &sheet, &located));
         if observed.iter().all(Option::is_none) {
             notes.extend(unread_observations(policy, &sheet, &located));
         }
@@ -240,6 +241,25 @@ fn unread_duty(sheet: &Sheet, located: &Located, names: &[[String; 3]]) -> Optio
     })
 }
 
+/// A column that may be the choice, where nothing says what was chosen.
+fn unread_action(policy: &Policy, sheet: &Sheet, located: &Located) -> Option<String> {
+    let paths = policy.paths();
+    let [path] = paths.as_slice() else { return None };
+    let is_said = ["action", "duty"].iter().any(|name| located.signal(name).is_some());
+    if is_said || !path.head.is_choice() {
+        return None;
+    }
+    let columns = located.unused.iter().filter_map(|index| sheet.columns().get(*index));
+    let mut names = columns.map(|column| column.name.as_str());
+    let name = names.find(|name| {
+        let name = name.to_ascii_lowercase();
+        name == "a" || name.starts_with("act") || name.ends_with("_action")
+    })?;
+    Some(format!(
+        "`{name}` may be the choice of the network: with --map action={name} it is compared, too"
+    ))
+}
+
 /// Columns that count as many features as the network has, under another stem than `obs_`, where no observation was read.
 fn unread_observations(policy: &Policy, sheet: &Sheet, located: &Located) -> Option<String> {
     let unread = located.unused.iter().filter_map(|index| sheet.columns().get(*index));
@@ -265,7 +285,10 @@ fn unread_observations(policy: &Policy, sheet: &Sheet, located: &Located) -> Opt
 /// Columns that say what the trainer did, beside samples and observations.
 fn done_quantities(names: &[[String; 3]]) -> Vec<Quantity<'_>> {
     let quantity = |name, aliases, unit| Quantity { name, aliases, unit };
-    let mut done = vec![quantity("t", &["time"], "s"), quantity("episode", &["episodes"], "")];
+    let mut done = vec![
+        quantity("t", &["time"], "s"),
+        quantity("episode", &["episodes", "ep"], ""),
+    ];
     for [action, duty, previous_duty] in names {
         let aliases: &[&str] = match action.as_str() {
             "action" => &["actions", "action_index"],

@@ -78,7 +78,15 @@ impl<'a> SignalColumns<'a> {
         let mut faults = table_faults();
         let mut columns = Vec::new();
         let quantities = self.quantities();
-        let proposal = proposal(&sheet.guesses(located, &quantities));
+        let mut guesses: Vec<(&str, &str)> = sheet.guesses(located, &quantities);
+        for quantity in &quantities {
+            let is_open =
+                located.signal(quantity.name).is_none() && guesses.iter().all(|(name, _)| *name != quantity.name);
+            if let Some(header) = sheet.nearly(located, quantity).filter(|_| is_open) {
+                guesses.push((quantity.name, header));
+            }
+        }
+        let proposal = proposal(&guesses);
         for (signal, quantity) in self.policy.signals.iter().zip(&quantities) {
             match located.signal(&signal.name) {
                 Some(found) => columns.push((signal, found)),

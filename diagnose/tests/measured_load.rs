@@ -167,7 +167,10 @@ fn a_duty_step_at_a_resistor_is_no_step_of_the_load() {
     let found = diagnosed(&bench, 0.1);
     assert_eq!(found.findings.verdict, Verdict::Consistent);
     let notes = found.findings.noise.repairs.join("\n");
-    assert!(notes.contains("i_out is taken for a resistor of 1 level"), "{notes}");
+    assert!(
+        notes.contains("i_out is taken for a resistor in 1 stretch at rest"),
+        "{notes}"
+    );
 }
 
 #[test]

@@ -144,6 +144,9 @@ impl Quantity<'_> {
 
     /// What a header calls this quantity.
     pub(crate) fn called<'h>(&'h self, header: &'h str) -> &'h str {
+        if self.is_called(header.trim()) {
+            return header.trim();
+        }
         let (base, _) = split_unit(header);
         // `v_out_mV` is called `v_out` where a fault names it
         let shorter = base.rsplit_once(['_', ' ']).map(|(shorter, _)| shorter.trim_end());
@@ -153,6 +156,10 @@ impl Quantity<'_> {
 
     /// What a number below `header` must be multiplied by, if that is a name of this quantity, with a unit or without.
     pub(crate) fn scale_of(&self, header: &str) -> Option<f64> {
+        // a name may have brackets itself, as an element of an array: `obs[0]`
+        if self.is_called(header.trim()) {
+            return Some(1.0);
+        }
         let (base, unit) = split_unit(header);
         if self.is_called(base) {
             return unit.map_or(Some(1.0), |unit| self.scale_from(unit));
@@ -214,17 +221,13 @@ impl Quantity<'_> {
     }
 }
 
-/// A name and the unit in brackets, behind a stroke or as a percent sign: `v_out [mV]`, `i_l/A`, `duty (%)`, `d%`. A number is no unit.
+/// A name and the unit in brackets, behind a stroke or as a percent sign: `v_out [mV]`, `i_l/A`, `duty (%)`, `d%`.
 pub(crate) fn split_unit(header: &str) -> (&str, Option<&str>) {
     let header = header.trim();
     match header.find(['[', '(', '/', '%']) {
         // a sign at the start is all of the name: `%` alone measures nothing
         Some(start) if start > 0 => {
             let unit = header[start..].trim_matches(|c: char| c == ' ' || "[]()/".contains(c));
-            // an index is part of the name: `obs[0]`
-            if !unit.is_empty() && unit.chars().all(|c| c.is_ascii_digit()) {
-                return (header, None);
-            }
             (header[..start].trim_end_matches([' ', '_']), Some(unit))
         }
         _ => (header, None),

@@ -55,9 +55,7 @@ pub fn unsure(lines: &mut Lines, parameters: &Parameters) -> Option<String> {
             }
         }
     }
-    Some(format!(
-        "{what}, and on which side nobody knows: voltage and load current of these are not compared"
-    ))
+    Some(format!("{what}, and on which side nobody knows: they are left out"))
 }
 
 #[cfg(test)]

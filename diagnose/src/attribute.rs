@@ -245,8 +245,8 @@ impl Attribution {
         self.leave_out(problem, profiles, &out)
     }
 
-    /// Takes out causes whose evidence is too weak for the colour of what is left, or that are a rhythm of the rows; `beside_line` if a line is there, with the model as given or
-    /// in the end. Their ids. For the time before there are profiles.
+    /// Takes out causes whose evidence is too weak for the colour of what is left, or that are a rhythm of the rows; `beside_line` if a line
+    /// is there, with the model as given or in the end. Their ids. For the time before there are profiles.
     pub fn leave_out_coloured(&mut self, problem: &Problem, beside_line: bool) -> Vec<&'static str> {
         let Some(best) = self.best.clone() else {
             return Vec::new();

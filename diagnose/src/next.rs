@@ -143,7 +143,9 @@ fn largest(record: &Record, model: &Model) -> [f64; 2] {
     let made = Problem::new(vec![record.clone()], model.clone());
     let starts = made.first_starts();
     let shown = crate::drive::simulate(model, &made.records[0], &starts.of(0));
-    [0, 1].map(|n| shown.iter().map(|row| row[n].abs()).fold(0.0, f64::max))
+    // what runs away is no number in the end, and no bench bears it
+    let size = |value: f64| if value.is_nan() { f64::INFINITY } else { value.abs() };
+    [0, 1].map(|n| shown.iter().map(|row| size(row[n])).fold(0.0, f64::max))
 }
 
 /// Whether it asks no more than that of a bench, as far as the records say what it has borne.

@@ -49,7 +49,9 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             }
             let shown: Vec<f64> = rows.iter().map(|row| values[*row]).collect();
             let digit = one.lattice[n].max(one.resolution[n]) / problem.sigma[n];
-            scatter_of_ringing(&shown, |rows| rows.iter().all(|v| *v != 0.0)).max(flicker::noise(&shown, digit))
+            // rows without a value are no meter that shows one all the time
+            let measured: Vec<f64> = shown.iter().copied().filter(|v| *v != 0.0).collect();
+            scatter_of_ringing(&shown, |rows| rows.iter().all(|v| *v != 0.0)).max(flicker::noise(&measured, digit))
         };
         // the median: one noisy record must not hide what the others show
         let typical = middle((0..problem.records.len()).map(of)) * few::unsure(problem, n);

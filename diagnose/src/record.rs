@@ -155,6 +155,7 @@ impl Record {
             ));
         }
         record.report_holes(&labels);
+        edges::leave_out(&mut record, parameters);
         record.leave_out_stuck(&labels);
         record.leave_out_clipped(&labels);
         if record.measured.iter().flatten().all(|value| value.is_nan()) {

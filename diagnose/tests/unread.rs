@@ -78,3 +78,24 @@ fn a_voltage_that_never_moves_is_not_compared() {
     assert!(!found.findings.compared.leaves_out());
     assert!(found.findings.sentence.contains("never moves"));
 }
+
+#[test]
+fn a_record_whose_voltage_never_moves_says_nothing_about_its_noise() {
+    let noise = |tables: &[Table]| {
+        let read = |(n, table): (usize, &Table)| {
+            table
+                .read_mapped(&format!("run{n}"), &model(), &ColumnMap::default())
+                .unwrap()
+        };
+        let records = tables.iter().enumerate().map(read).collect();
+        let json = serde_json::to_value(&diagnose(&model(), records, &[], &|_| ()).findings).unwrap();
+        json["noise"]["sigma"]["v_o"].as_f64().unwrap()
+    };
+    let (sound, mut stuck) = (table("v_out"), table("v_out"));
+    stuck.column("v_out").fill(100.0);
+    let alone = noise(std::slice::from_ref(&sound));
+    assert!((alone / 0.1 - 1.0).abs() < 0.25, "{alone}");
+    let beside = noise(&[sound, stuck]);
+    // the fit of both is another one, by a little
+    assert!((beside / alone - 1.0).abs() < 0.05, "{beside} for {alone}");
+}

@@ -5,7 +5,6 @@ use plant::{Load, Parameters};
 use toml_input::{Faults, Message};
 
 use super::channels::{CHANNELS, FEWEST, FEWEST_SETTLED, QUANTITIES, Segment};
-use super::edges;
 use super::levels::{self, Level};
 use super::logged;
 use super::raw::Raw;
@@ -83,7 +82,6 @@ impl Raw<'_> {
         self.note_leaps();
         let mut lines = self.picked(&rows, phase)?;
         self.take_levels(&mut lines, &rows);
-        self.repairs.extend(edges::unsure(&mut lines, parameters));
         Ok(Lines {
             time: (0..rows.len()).map(|n| self.start + n as f64 * t_sw).collect(),
             segments: segments(&rows, &lines.duty, &lines.load),

@@ -30,7 +30,7 @@ use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 use crate::resistors;
 use crate::unseen;
 use crate::whiteness;
-use crate::words::{nearest, other_carrier as other_carrier_said, sentence, shifted, si};
+use crate::words::{self, nearest, other_carrier as other_carrier_said, sentence, shifted};
 use crate::work::Work;
 use crate::worth::{self, Worth};
 
@@ -387,29 +387,6 @@ fn noise_of(found: &Examined, trim: f64, repairs: impl Iterator<Item = String>) 
     }
 }
 
-/// A duty that the edges of the gate take or give, where it is more than their usual scatter: a dead time that the model lacks by so
-/// little is taken for edges, and nobody would know.
-fn edges(found: &Examined) -> Option<String> {
-    let problem = &found.problem;
-    let trim = found
-        .attribution
-        .state()
-        .starts
-        .trim_or_none(problem.base.plant.converter.f_sw);
-    let known = problem.duty_accuracy();
-    (found.verdict != Verdict::Unexplained && trim.abs() > known).then(|| {
-        let p = &problem.base.plant.converter;
-        let node = p.topology.span(p.v_in, problem.bases.v);
-        let [time, volts] = [(trim * problem.bases.t_sw, "s"), (trim * node, "V")]
-            .map(|(value, unit)| si(value.abs(), unit));
-        let (way, less) = if trim < 0.0 { ("lost", "more") } else { ("won", "less") };
-        format!(
-            "{time} of on-time are {way} in each period ({volts} at the switching node) and put down to edges of the gate: if dead time or delays of \
-             the bench are not those of the model, they are {less} by this"
-        )
-    })
-}
-
 /// What was repaired in each record; what is the same in several is said once.
 fn by_text<'a>(records: impl Iterator<Item = &'a Record>) -> Vec<String> {
     let mut list: Vec<(&str, Vec<&str>)> = Vec::new();
@@ -442,7 +419,8 @@ fn notes(found: &Examined, pair: Option<&Pair>) -> Vec<String> {
         format!("{id} would fit a little better, by less than two simulators of one circuit differ: not named")
     }));
     notes.extend(pair.into_iter().flat_map(|pair| pair.remarks.clone()));
-    notes.extend(edges(found));
+    // with nothing else to say it is the answer itself
+    notes.extend(words::edges(found).filter(|_| found.verdict != Verdict::Consistent || !found.lines.is_empty()));
     notes.extend(resistors::note(attribution).filter(|_| found.verdict != Verdict::Unexplained));
     // of what was found: where the model as given is far off, so are the instants of load steps that fit it best
     if found.verdict != Verdict::Unexplained {

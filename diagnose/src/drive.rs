@@ -11,7 +11,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use measured::{DutyIs, Sampled};
-use plant::{Load, Parameters, Plant, Signals};
+use plant::{Carrier, Load, Parameters, Plant, Rectifier, Signals};
 
 use crate::record::{CHANNELS, Record, Segment};
 use crate::resistors::{self, Resistor};
@@ -112,10 +112,7 @@ pub fn simulate(model: &Model, record: &Record, begin: &Begin<'_>) -> Vec<[f64; 
             *sensor = plant::Sensor::default();
         }
     }
-    // as late edges, which add or take duty whatever the commanded one is; a delay cannot be negative, hence two
-    let trim = begin.trim;
-    p.switch.turn_off_delay += trim.max(0.0) * p.t_sw();
-    p.switch.turn_on_delay += (-trim).max(0.0) * p.t_sw();
+    let longer = trimmed(&mut p, begin.trim);
     let instant = record.phase + model.late / p.t_sw();
     let mut whole = (instant + SAME).floor();
     let mut phase = instant - whole;
@@ -157,6 +154,7 @@ pub fn simulate(model: &Model, record: &Record, begin: &Begin<'_>) -> Vec<[f64; 
         }
         // a fit may try numbers that are no converter: NaN costs it that step, and not the diagnosis
         let Ok(mut plant) = Plant::new(&p) else { return shown };
+        plant.lengthen(longer);
         match record.settled {
             true if driver.repeats(segment.start) => shown[segment.start] = shown[segment.start - 1],
             true => driver.settle(&mut plant, segment.start, start, &mut shown),
@@ -164,6 +162,25 @@ pub fn simulate(model: &Model, record: &Record, begin: &Begin<'_>) -> Vec<[f64; 
         }
     }
     shown
+}
+
+/// Whether late edges would make of a trim what no line through its origin describes: where a synchronous leg's current is negative a late
+/// edge does nothing or the opposite, and where the on-interval lies in the middle of the period a late edge of either kind moves it
+/// the same way. A fit that takes tangents ends far off there.
+#[must_use]
+pub fn is_even(p: &Parameters) -> bool {
+    p.converter.rectifier == Rectifier::Synchronous || p.pwm.carrier == Carrier::Centre
+}
+
+/// Puts a trim into a converter as late edges, which add or take duty whatever the commanded one is; a delay cannot be negative, hence two.
+/// The share by which its pulses are to be longer instead, where [`is_even`].
+fn trimmed(p: &mut Parameters, trim: f64) -> f64 {
+    if is_even(p) {
+        return trim;
+    }
+    p.switch.turn_off_delay += trim.max(0.0) * p.t_sw();
+    p.switch.turn_on_delay += (-trim).max(0.0) * p.t_sw();
+    0.0
 }
 
 struct Driver<'a> {

@@ -54,19 +54,24 @@ pub(crate) fn likely(
         take_out(&mut column, &beside);
         column
     };
-    let levels = levels(problem);
-    let parts = (levels.len() <= FEW_LEVELS).then(|| {
+    // what all duties are moved by alike the edges of the gate take over, and better than this circuit knows it
+    let shares = levels(problem);
+    let parts = (shares.len() <= FEW_LEVELS).then(|| {
         // the circuit is linear: what a rounding does is the sum of what it does at each level of the duty
-        let columns = parallel::map(&levels, |level| projected(&|duty| f64::from(u8::from(duty == *level))));
+        let columns = parallel::map(&shares, |(level, _)| {
+            projected(&|duty| f64::from(u8::from(duty == *level)))
+        });
         let products = (columns.iter()).map(|a| columns.iter().map(|b| dot(a, b)).collect::<Vec<f64>>());
         let along: Vec<f64> = columns.iter().map(|column| dot(column, residual)).collect();
         (along, products.collect::<Vec<_>>())
     });
     let gains = parallel::map(&numbers, |counts| {
-        let moved = |duty: f64| rounded(duty, *counts, cut) - duty;
+        let by = |duty: f64| rounded(duty, *counts, cut) - duty;
+        let mean = shares.iter().map(|(duty, share)| share * by(*duty)).sum::<f64>();
+        let moved = |duty: f64| by(duty) - mean;
         let (along, length) = match &parts {
             Some((along, products)) => {
-                let by: Vec<f64> = levels.iter().map(|level| moved(*level)).collect();
+                let by: Vec<f64> = shares.iter().map(|(level, _)| moved(*level)).collect();
                 let square = products.iter().zip(&by).map(|(row, by_row)| by_row * dot(row, &by));
                 (dot(along, &by), square.sum())
             }
@@ -128,13 +133,21 @@ fn take_out(column: &mut [f64], known: &[Vec<f64>]) {
 /// as much.
 const FEW_LEVELS: usize = 64;
 
-/// The duties of all records, each once.
-fn levels(problem: &Problem) -> Vec<f64> {
+/// The duties of all records, each once, and which share of the rows has it.
+fn levels(problem: &Problem) -> Vec<(f64, f64)> {
     let records = problem.records.iter().filter(|record| !record.settled);
     let mut duties: Vec<f64> = records.flat_map(|record| record.duty.iter().copied()).collect();
     duties.sort_by(f64::total_cmp);
-    duties.dedup();
-    duties
+    let row = 1.0 / duties.len().max(1) as f64;
+    let mut levels: Vec<(f64, f64)> = Vec::new();
+    for duty in duties {
+        match levels.last_mut() {
+            // exact: duties of a table that are one are so to the bit
+            Some((level, share)) if *level == duty => *share += row,
+            _ => levels.push((duty, row)),
+        }
+    }
+    levels
 }
 
 /// A share of a count by which a duty in decimals may miss a whole one.
@@ -267,10 +280,12 @@ mod tests {
         let model = Parameters::paper_table();
         let problem = problem(&model);
         let levels = levels(&problem);
-        assert_eq!(levels, [0.437, 0.5, 0.561]);
+        let duties: Vec<f64> = levels.iter().map(|(duty, _)| *duty).collect();
+        assert_eq!(duties, [0.437, 0.5, 0.561]);
+        assert!((levels.iter().map(|(_, share)| share).sum::<f64>() - 1.0).abs() < 1e-12);
         let whole = response(&problem, &model, &|duty| rounded(duty, 33.3, Cut::Nearest) - duty);
         let mut sum = vec![0.0; whole.len()];
-        for level in levels {
+        for (level, _) in levels {
             let unit = response(&problem, &model, &|duty| f64::from(u8::from(duty == level)));
             let by = rounded(level, 33.3, Cut::Nearest) - level;
             sum.iter_mut().zip(unit).for_each(|(sum, unit)| *sum += by * unit);

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use plant::Parameters;
 
 use crate::diagnosis::Diagnosis;
-use crate::drive::Model;
+use crate::drive::{Model, is_even};
 use crate::findings::Verdict;
 use crate::problem::duty_accuracy;
 use crate::words::needs;
@@ -18,8 +18,13 @@ use crate::words::needs;
 // resolve such remains of a fit, and in the file a delay of 1e-10 s would read as a finding
 const NO_TRIM: f64 = 0.01;
 
-/// Where the trim is written.
-const EDGES: [&str; 2] = ["switch.turn_on_delay", "switch.turn_off_delay"];
+/// Where the trim is written: as it was fitted, and as edges where an offset would be rounded to counts.
+fn keys_of_trim(p: &Parameters) -> &'static [&'static str] {
+    match is_even(p) && p.pwm.duty_lsb == 0.0 {
+        true => &["pwm.duty_offset"],
+        false => &["switch.turn_on_delay", "switch.turn_off_delay"],
+    }
+}
 
 /// The trim as it is told, 1: 0 where it is less than any edge does; `f_sw` in Hz.
 pub fn told(trim: f64, f_sw: f64) -> f64 {
@@ -36,9 +41,14 @@ pub fn as_plant(model: &Model, trim: f64) -> Parameters {
     let mut p = model.plant.clone();
     let t_sw = p.t_sw();
     let trim = told(trim, p.converter.f_sw);
-    // the same edges as in `drive::simulate`, so that the file shows what was fitted
-    p.switch.turn_off_delay += trim.max(0.0) * t_sw;
-    p.switch.turn_on_delay += (-trim).max(0.0) * t_sw;
+    // the same as in `drive::simulate`, so that the file shows what was fitted
+    match keys_of_trim(&p) {
+        ["pwm.duty_offset"] => p.pwm.duty_offset += trim,
+        _ => {
+            p.switch.turn_off_delay += trim.max(0.0) * t_sw;
+            p.switch.turn_on_delay += (-trim).max(0.0) * t_sw;
+        }
+    }
     let phase = p.pwm.sampling_phase + model.late / t_sw;
     if (0.0..1.0).contains(&phase) {
         p.pwm.sampling_phase = phase;
@@ -138,9 +148,13 @@ pub fn partial_toml(diagnosis: &Diagnosis) -> Option<String> {
 fn written(diagnosis: &Diagnosis, mut text: String, after: &Parameters, trim: f64) -> String {
     let before = &diagnosis.given.model.plant;
     if trim != 0.0 {
+        let place = match keys_of_trim(after) {
+            ["pwm.duty_offset"] => format!("pwm.duty_offset holds {trim:.3e} of duty,"),
+            _ => "The switch's delays hold".to_owned(),
+        };
         let _ = writeln!(
             text,
-            "# The switch's delays hold {:.1} ns of duty that the gate's edges seem to add; not a cause.",
+            "# {place} {:.1} ns of duty that the gate's edges seem to add; not a cause.",
             1e9 * trim * before.t_sw()
         );
     }
@@ -215,7 +229,7 @@ fn notes(diagnosis: &Diagnosis, after: &Parameters, trim: f64) -> BTreeMap<&'sta
         }
         let interval = intervals.get(parameter.key).map_or("", String::as_str);
         // a reader who looks for what was found must not take these for it
-        let beside = match trim != 0.0 && EDGES.contains(&parameter.key) {
+        let beside = match trim != 0.0 && keys_of_trim(after).contains(&parameter.key) {
             true => "edges of the gate, fitted beside every cause and none itself; ",
             false => "",
         };

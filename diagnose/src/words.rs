@@ -45,7 +45,12 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>, left:
         Verdict::Consistent if !found.lines.is_empty() => {
             format!("The model explains the records but for {lines}. No cause of the list makes that.")
         }
-        Verdict::Consistent => "The model explains the records within their noise: nothing to correct.".to_owned(),
+        Verdict::Consistent => match edges(found) {
+            None => "The model explains the records within their noise: nothing to correct.".to_owned(),
+            Some(edges) => {
+                format!("The model explains the records within their noise, with one thing beside it. {edges}.")
+            }
+        },
         Verdict::Explained | Verdict::Ambiguous | Verdict::MostlyExplained => {
             let ties = causes.iter().filter(|cause| !cause.rivals.is_empty());
             let ties: Vec<String> = ties.map(|cause| tie(cause, causes)).collect();
@@ -232,6 +237,31 @@ pub fn nearest(partial: &[Named], removed: f64, fits_training: bool, left: &[Str
             )
         }
     }
+}
+
+/// A duty that the edges of the gate take or give, where it is more than their usual scatter: a dead time that the model lacks by so
+/// little is taken for edges, and nobody would know.
+#[must_use]
+pub fn edges(found: &Examined) -> Option<String> {
+    let problem = &found.problem;
+    let trim = found
+        .attribution
+        .state()
+        .starts
+        .trim_or_none(problem.base.plant.converter.f_sw);
+    let known = problem.duty_accuracy();
+    (found.verdict != Verdict::Unexplained && trim.abs() > known).then(|| {
+        let p = &problem.base.plant.converter;
+        let node = p.topology.span(p.v_in, problem.bases.v);
+        let [time, volts] = [(trim * problem.bases.t_sw, "s"), (trim * node, "V")]
+            .map(|(value, unit)| si(value.abs(), unit));
+        let (way, less) = if trim < 0.0 { ("lost", "more") } else { ("won", "less") };
+        format!(
+            "{time} of on-time are {way} in each period ({volts} at the switching node) and put down to edges of the gate: if dead time or delays of \
+             the bench are not those of the model, they are {less} by this. A voltage that is read off by as much would look the same: a \
+             multimeter at the output tells"
+        )
+    })
 }
 
 /// Said behind the verdict: what no fit to the training records can know.

@@ -22,6 +22,8 @@ use crate::signals::{Load, Sample, Signals};
 #[derive(Debug, Clone)]
 pub struct Plant {
     pub(crate) parameters: Parameters,
+    /// Share of the period by which every pulse is longer ([`Plant::lengthen`]).
+    longer: f64,
     pub(crate) t_sw: f64,
     pub(crate) plain: Plain,
     pub(crate) legs: Legs,
@@ -72,6 +74,7 @@ impl Plant {
             timing,
             sensing,
             parameters: p.clone(),
+            longer: 0.0,
             state: PlantState {
                 x: States::default(),
                 path: Path::OPEN,
@@ -238,7 +241,17 @@ impl Plant {
         let queued = self.state.queue.pass(clamped, pwm.duty_delay);
         let corrected = (self.correction).correct(queued, &mut self.state.slow, &self.state.x);
         let shifted = duty_offset::shift(corrected, pwm);
-        minimum_on_time::limit(duty_quantisation::round(shifted, pwm.duty_lsb), pwm, self.t_sw)
+        let pulse = minimum_on_time::limit(duty_quantisation::round(shifted, pwm.duty_lsb), pwm, self.t_sw);
+        if self.longer == 0.0 || pulse <= 0.0 || pulse >= 1.0 {
+            return pulse;
+        }
+        (pulse + self.longer).clamp(0.0, 1.0)
+    }
+
+    /// Makes every pulse longer by this share of the period, shorter where it is negative, behind all that the modulator does. What a gate does by
+    /// itself, to first order: `switch.turn_on_delay` and its like act the other way round where the current is negative.
+    pub fn lengthen(&mut self, share: f64) {
+        self.longer = share;
     }
 
     #[inline(always)]

@@ -88,10 +88,14 @@ pub(super) const ESL: Cause = Cause {
     )],
 };
 
+// where the filter rings another part is another frequency, and from its own a fit ends at a beat of the two: from 0.66, 0.8, 1.24 and 1.5 of
+// it as well, which are as far apart as a fit reaches
+const OTHER_PART: Search = Search::OwnOr(&[&[-17.0], &[-10.0], &[12.0], &[25.0]]);
+
 pub(super) const L_WRONG: Cause = Cause {
     id: "l_wrong",
     kind: Kind::Part,
-    forms: &[form(
+    forms: &[searched(
         "inductance",
         &[knob(
             "inductance",
@@ -99,19 +103,21 @@ pub(super) const L_WRONG: Cause = Cause {
             // beyond a third or three times it is another part; the step is a fifth of a usual tolerance (10 %)
             Reach::Own(0.3, 3.0, 0.02),
         )],
+        OTHER_PART,
     )],
 };
 
 pub(super) const C_WRONG: Cause = Cause {
     id: "c_wrong",
     kind: Kind::Part,
-    forms: &[form(
+    forms: &[searched(
         "capacitance",
         &[knob(
             "capacitance",
             &["converter.capacitance"],
             Reach::Own(0.3, 3.0, 0.02),
         )],
+        OTHER_PART,
     )],
 };
 

@@ -361,7 +361,9 @@ impl Searcher<'_> {
                 };
                 let is_rival = |fit: &Fit| {
                     let other = fit.causes.last().is_some_and(|cause| !self.same(*cause, *own));
-                    other && fit.state.chi2 <= best.state.chi2 + tolerance
+                    // the trim takes over what such a cause leaves, and is more than it may
+                    let is_left_to_edges = self.asks_for_edges(&fit.state) && !self.asks_for_edges(&best.state);
+                    other && !is_left_to_edges && fit.state.chi2 <= best.state.chi2 + tolerance
                 };
                 let near = |fit: &Fit| fit.state.chi2 <= best.state.chi2 + NEAR * tolerance;
                 let all: Vec<Fit> = all.into_iter().filter(near).collect();

@@ -272,7 +272,8 @@ fn plans(problem: &Problem) -> Vec<Planned> {
         ),
         (
             "zero-reading",
-            "zero reading: duty 0 without load current".to_owned(),
+            "zero reading: duty 0 without load current (a converter that ends at 0 V shows offsets above 0 alone)"
+                .to_owned(),
             none,
             (1.0, none, none),
         ),

@@ -56,7 +56,19 @@ const SYNONYMS: [(&str, &[&str]); 9] = [
             "lastwiderstand",
         ],
     ),
-    ("i_load", &["iload", "iset", "loadset", "setcurrent", "sollstrom"]),
+    (
+        "i_load",
+        &[
+            "iload",
+            "iset",
+            "loadset",
+            "setcurrent",
+            "sollstrom",
+            "eload",
+            "electronicload",
+            "elast",
+        ],
+    ),
     ("p_load", &["pload", "plast", "pset", "loadpower", "lastleistung"]),
 ];
 
@@ -301,6 +313,7 @@ mod tests {
             ("u_dc", Some("v_in")),
             ("Uoutput", Some("v_out")),
             ("Iload", Some("i_load")),
+            ("eload_A", Some("i_load")),
             ("R_Last", Some("r_load")),
             // neither is a quantity that is read, or says which
             ("Iin", None),

@@ -186,7 +186,8 @@ pub const CORTEX_M33: TargetSpec = TargetSpec {
     description: "Arm Cortex-M33 with FPU (Armv8-M Mainline, FPv5-SP)",
     fma: Fma::Unrated,
     flushes_subnormals: false,
-    // no cycle model either: the tables differ from core to core
+    // no cycle model either: the tables differ from core to core. It issues in order, and two at once only of some pairs of 16-bit instructions
+    most_per_cycle: Some(2),
     clock_hz: Some(160_000_000),
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m33", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard"]),

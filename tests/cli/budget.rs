@@ -74,6 +74,32 @@ fn what_is_left_of_the_period_behind_the_sample_counts() {
     );
 }
 
+/// Without cycles of its own a core has a bound, and beside it what a modelled one of the same instructions takes.
+#[test]
+fn a_core_without_cycles_that_is_too_slow_by_any_reading_is_told_so() {
+    let desk = Desk::new("bound");
+    let example = tests::example();
+    let at = |clock: &str| {
+        desk.succeed(&format!(
+            "compile {} --target cortex-m33 --clock {clock} --out {clock}",
+            example.display()
+        ))
+    };
+    // 100 us at 30 MHz are 3,000 cycles, and no build has less than twice as many instructions
+    let slow = at("30MHz");
+    for word in [
+        "control period NOT met",
+        "2 a cycle at most",
+        "in less than ",
+        "Cortex-M4F",
+        "for a step at this clock",
+    ] {
+        assert!(slow.contains(word), "{word}: {slow}");
+    }
+    let fast = at("170MHz");
+    assert!(fast.contains("cannot be said") && fast.contains("Cortex-M4F"), "{fast}");
+}
+
 /// The advice is taken: a network of the size that is named meets its period, one a step wider does not.
 #[test]
 fn a_network_that_fits_is_named() {

@@ -225,6 +225,10 @@ fn arrows(sizes: &[usize]) -> String {
 /// than a tenth of the instructions are branches.
 const FOLDED: f64 = 1.1;
 
+fn micros(seconds: f64) -> String {
+    format!("{:.1} us", 1e6 * seconds)
+}
+
 /// What is said where even the most instructions that a processor begins in a cycle are too few for a step in the policy's format.
 fn too_many(
     policy: &Policy,
@@ -260,9 +264,11 @@ fn too_many(
             others_need.join(", ")
         ),
     };
+    let shortest = micros(least.instructions_max as f64 / allowed / clock.hz);
+    let by_comparison = relative(policy, target, outputs, clock)?.unwrap_or_default();
     Ok(Some(format!(
         "  control period NOT met: {} instructions in the shortest build, {}, are {needed:.2} for each of {} cycles at {clock}, and {} begins \
-         {most} a cycle at most, branches apart{others_need}",
+         {most} a cycle at most, branches apart: in less than {shortest} no step ends{others_need}{by_comparison}",
         grouped(least.instructions_max),
         least.build,
         grouped(cycles as u64),
@@ -308,14 +314,19 @@ fn unmodelled(
             text += &format!("; {:.2} in {}", instructions as f64 / cycles, format.name());
         }
     }
-    if let Some(by_comparison) = relative(policy, target, outputs)? {
+    if let Some(by_comparison) = relative(policy, target, outputs, clock)? {
         text += &by_comparison;
     }
     Ok(text + ". A cycle counter on the board says the rest")
 }
 
 /// What a modelled processor of the same instructions makes of such code, for one who has to judge whether that is much.
-fn relative(policy: &Policy, target: &'static TargetSpec, outputs: &[Output]) -> Result<Option<String>, CodegenError> {
+fn relative(
+    policy: &Policy,
+    target: &'static TargetSpec,
+    outputs: &[Output],
+    clock: Clock,
+) -> Result<Option<String>, CodegenError> {
     let modelled = match target.name {
         "cortex-m33" | "cortex-m7" => targets::find("cortex-m4f"),
         _ => None,
@@ -329,9 +340,12 @@ fn relative(policy: &Policy, target: &'static TargetSpec, outputs: &[Output]) ->
     Ok(soonest.map(|(instructions, (least, most))| {
         let a_cycle = |cycles: u64| instructions as f64 / cycles as f64;
         format!(
-            ". By comparison: a Cortex-M4F, whose cycles are modelled, does {:.2} to {:.2} instructions a cycle in this code, at 0 wait states",
+            ". By comparison: a Cortex-M4F, whose cycles are modelled, does {:.2} to {:.2} instructions a cycle in this code at 0 wait states, \
+             and takes {} to {} for a step at this clock",
             a_cycle(most),
-            a_cycle(least)
+            a_cycle(least),
+            micros(least as f64 / clock.hz),
+            micros(most as f64 / clock.hz)
         )
     }))
 }

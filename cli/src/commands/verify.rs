@@ -74,6 +74,10 @@ fn compare(options: &Verify) -> Result<Outcome, Failure> {
     for (path, recording) in options.trace.iter().zip(&recorded) {
         let note = |note: &String| talk::note(&format!("{}: {note}", path.display()));
         recording.notes.iter().for_each(note);
+        note(&format!(
+            "its {} rows are replayed in every build; whether the contract chooses what was chosen there, `policyc replay` says",
+            grouped(recording.steps().len() as u64)
+        ));
     }
     let on_disk = options
         .generated

@@ -340,7 +340,15 @@ fn incomplete(sheet: &Sheet, located: &Located, may_be_capture: bool) -> Sink {
         let duty = Quantity::all(&["duty"]);
         list.extend(duty.iter().map(|duty| sheet.missing(duty, hint)));
     }
-    let guesses = sheet.guesses(located, &Quantity::all(&NAMES));
+    let mut guesses = sheet.guesses(located, &Quantity::all(&NAMES));
+    if let (None, false, Some((column, _))) = (
+        located.signal("t"),
+        guesses.iter().any(|(name, _)| *name == "t"),
+        located.time_like(sheet),
+    ) {
+        // asked for as soon as the others are mapped
+        guesses.insert(0, ("t", &sheet.columns()[column].name));
+    }
     let is_guessed = |names: &[&str]| guesses.iter().any(|(name, _)| names.contains(name));
     if !QUANTITIES.into_iter().any(has) && !may_be_capture {
         let problem = match is_guessed(&QUANTITIES) {

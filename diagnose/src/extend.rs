@@ -148,15 +148,17 @@ pub fn partial_toml(diagnosis: &Diagnosis) -> Option<String> {
 fn written(diagnosis: &Diagnosis, mut text: String, after: &Parameters, trim: f64) -> String {
     let before = &diagnosis.given.model.plant;
     if trim != 0.0 {
-        let place = match keys_of_trim(after) {
-            ["pwm.duty_offset"] => format!("pwm.duty_offset holds {trim:.3e} of duty,"),
-            _ => "The switch's delays hold".to_owned(),
+        let time = 1e9 * trim * before.t_sw();
+        let _ = match keys_of_trim(after) {
+            ["pwm.duty_offset"] => writeln!(
+                text,
+                "# pwm.duty_offset holds {trim:.5} ({time:.1} ns) that the gate's edges seem to add to every pulse; not a cause."
+            ),
+            _ => writeln!(
+                text,
+                "# The switch's delays hold {time:.1} ns of duty that the gate's edges seem to add; not a cause."
+            ),
         };
-        let _ = writeln!(
-            text,
-            "# {place} {:.1} ns of duty that the gate's edges seem to add; not a cause.",
-            1e9 * trim * before.t_sw()
-        );
     }
     let notes = notes(diagnosis, after, trim);
     let own = diagnosis.model_text.as_deref().map(without_head);

@@ -58,7 +58,8 @@ impl Asked {
                 true => command.flag(name, true),
                 false => command.option(name, value),
             });
-        others.option("--out", "diagnosis")
+        // not the folder itself: the same input makes the same page, wherever it lies
+        others.option("--out", "DIR")
     }
 
     fn read(&self) -> Vec<(&'static str, String)> {

@@ -2,7 +2,7 @@
 
 use crate::locate::Located;
 use crate::metered::is_metered;
-use crate::quantity::{Quantity, is_unit, split_unit};
+use crate::quantity::{Quantity, is_of, is_unit, split_unit};
 use crate::sheet::{Column, Sheet};
 
 /// What one word alone means, without case, umlauts and punctuation. One that could be two quantities (`current`, `voltage` beside
@@ -125,7 +125,8 @@ impl Sheet {
             let found = unused.find(|column| is_alike(&column.name, name, synonyms))?;
             Some((*name, found))
         };
-        let found: Vec<_> = missing.filter_map(column).collect();
+        let mut found: Vec<_> = missing.filter_map(column).collect();
+        found.extend(self.resistor(located, wanted, &found));
         let has_i_out = located.signal("i_out").is_some() || found.iter().any(|(name, _)| *name == "i_out");
         let asks_i_out = wanted.iter().any(|quantity| quantity.name == "i_out");
         // a load current that was read off a meter, whatever it is called
@@ -138,6 +139,24 @@ impl Sheet {
 }
 
 impl Sheet {
+    /// The one column in ohms, where nothing else says what the load is.
+    fn resistor<'a>(
+        &'a self,
+        located: &Located,
+        wanted: &[Quantity<'_>],
+        found: &[(&'static str, &'a Column)],
+    ) -> Option<(&'static str, &'a Column)> {
+        const LOADS: [&str; 3] = ["r_load", "i_load", "p_load"];
+        let has = |name: &&str| located.signal(name).is_some() || found.iter().any(|(known, _)| known == name);
+        if LOADS.iter().any(has) || !wanted.iter().any(|quantity| quantity.name == "r_load") {
+            return None;
+        }
+        let unused = located.unused.iter().filter_map(|index| self.columns().get(*index));
+        let mut ohms = unused.filter(|column| is_of(split_unit(&column.name).1.unwrap_or_default(), "ohm"));
+        let one = ohms.next()?;
+        ohms.next().is_none().then_some(("r_load", one))
+    }
+
     /// A column that nobody asked for and that has one of a quantity's names up to case and punctuation: `vo` for `v_o`.
     #[must_use]
     pub fn nearly<'a>(&'a self, located: &Located, quantity: &Quantity<'_>) -> Option<&'a str> {
@@ -334,6 +353,22 @@ mod tests {
                 expected.as_ref().map(|_| true),
                 "{header}: {guessed:?}"
             );
+        }
+    }
+
+    #[test]
+    fn the_one_column_in_ohms_is_the_load_where_nothing_else_is() {
+        assert_eq!(
+            proposed("t;duty;v_out;R_set [Ohm]").as_deref(),
+            Some("--map 'r_load=R_set [Ohm]'")
+        );
+        for header in [
+            "t;duty;v_out;R_1 [Ohm];R_2 [Ohm]",
+            "t;duty;v_out;i_load;R_set [Ohm]",
+            "t;duty;v_out;R_set [V]",
+        ] {
+            let map = proposed(header).unwrap_or_default();
+            assert!(!map.contains("r_load"), "{header}: {map}");
         }
     }
 

@@ -108,6 +108,11 @@ pub(crate) fn is_unit(text: &str) -> bool {
     unit(text).is_some()
 }
 
+/// Whether a text is a unit of what `wanted` measures.
+pub(crate) fn is_of(text: &str, wanted: &str) -> bool {
+    unit(text).is_some_and(|(of, _)| of == wanted)
+}
+
 /// How many of `to` one of `from` is; nothing if they do not measure the same.
 fn scale(from: &str, to: &str) -> Option<f64> {
     if from.eq_ignore_ascii_case(to) {

@@ -77,7 +77,7 @@ fn what_is_left_of_the_period_behind_the_sample_counts() {
 /// Without cycles of its own a core has a bound, and beside it what a modelled one of the same instructions takes.
 #[test]
 fn a_core_without_cycles_that_is_too_slow_by_any_reading_is_told_so() {
-    let desk = Desk::new("bound");
+    let desk = Desk::new("minimal");
     let example = tests::example();
     let at = |clock: &str| {
         desk.succeed(&format!(

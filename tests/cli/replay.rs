@@ -472,3 +472,24 @@ fn replay_counts_an_action_of_the_same_q_value_as_a_tie_and_another_one_as_diffe
         ran.stdout
     );
 }
+
+#[test]
+fn a_feature_with_one_row_off_is_not_taken_for_itself() {
+    // 1e-4 of its largest value is allowed, and this is twice that
+    let line = said_of(0, "e", |rows, k| {
+        rows[k].observation[0] + if k == 30 { 2.5e-4 } else { 0.0 }
+    });
+    assert!(!line.contains("another order of the features"), "{line}");
+}
+
+#[test]
+fn a_tolerance_below_the_rounding_of_binary32_is_said_not_to_be_kept() {
+    let desk = desk(&environment());
+    let kept = desk.succeed("replay buck12 log.csv");
+    assert!(
+        kept.contains("within 0.0001 of their largest value") && !kept.contains("rounding of binary32"),
+        "{kept}"
+    );
+    let below = desk.succeed("replay buck12 log.csv --tolerance 1e-12");
+    assert!(below.contains("within the rounding of binary32"), "{below}");
+}

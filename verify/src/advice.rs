@@ -253,16 +253,17 @@ fn too_many(
         let costs = in_format(&policy, target, outputs)?;
         if let Some(instructions) = costs.measured().map(|costs| costs.instructions_max).min() {
             let needed = instructions as f64 / cycles;
-            let verdict = if needed > allowed { " (not met)" } else { "" };
+            let verdict = match needed {
+                _ if needed > allowed => " (not met)",
+                _ if needed > f64::from(most) => " (hardly)",
+                _ => " (a cycle counter on the board decides)",
+            };
             others_need.push(format!("{} needs {needed:.2}{verdict}", format.name()));
         }
     }
     let others_need = match others_need.is_empty() {
         true => String::new(),
-        false => format!(
-            "; {}. With --format, a cycle counter on the board says the rest",
-            others_need.join(", ")
-        ),
+        false => format!("; with --format {}", others_need.join(", ")),
     };
     let shortest = micros(least.instructions_max as f64 / allowed / clock.hz);
     let by_comparison = relative(policy, target, outputs, clock)?.unwrap_or_default();

@@ -158,7 +158,8 @@ pub struct Replay {
     /// all of them the contract's, with its actions or duties. Not of a log whose actions or first rows are not compared
     #[arg(long, value_name = "FILE", conflicts_with_all = ["exploring", "skip"])]
     pub golden: Option<PathBuf>,
-    /// Largest difference that is equal, as a share of the largest logged magnitude of the feature
+    /// Largest difference that is equal, as a share of the largest logged magnitude of the feature, of a duty that is no choice
+    /// as a share of its range. What binary32 leaves of a difference of large numbers is equal as well
     #[arg(long, value_name = "SHARE", default_value_t = ::verify::replay::TOLERANCE, value_parser = share)]
     pub tolerance: f64,
     /// Machine-readable

@@ -270,7 +270,8 @@ pub(super) fn explain(
         let line = logged.line(&all(&other.observation));
         line.is_some_and(|line| line.s == 1.0 && line.o == 0.0)
     };
-    if let Some(other) = course.features.iter().position(same) {
+    let mut others = course.features.iter().enumerate().filter(|(place, _)| *place != index);
+    if let Some((other, _)) = others.find(|(_, other)| same(other)) {
         let name = &policy.features.get(other)?.name;
         return Some(format!(
             "the log has here what the contract calls `{name}`: another order of the features"

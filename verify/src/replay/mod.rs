@@ -138,7 +138,7 @@ pub struct Compared {
 }
 
 /// Greedy actions against logged ones.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ActionResult {
     /// Rows with the logged action.
     pub equal: usize,
@@ -148,6 +148,8 @@ pub struct ActionResult {
     pub first_line: Option<usize>,
     /// The log's actions are a trainer's who explores: told, not judged.
     pub exploring: bool,
+    /// Of a duty that is no choice: the largest difference as a share of its range, and the line of the log in which it is.
+    pub worst: Option<(f64, usize)>,
 }
 
 impl Replay {
@@ -308,7 +310,7 @@ fn commands(of: Logged<'_>, course: &OutputCourse, wanted: Wanted) -> Option<Act
     } = of;
     let late = log.is_late(skip);
     let is_late = |row: &usize| late.get(*row).copied().unwrap_or(true);
-    let mut ties = 0;
+    let (mut ties, mut worst) = (0, None);
     let others: Vec<usize> = match (&done.actions, path.head.duty_span().zip(done.commanded())) {
         (Some(logged), _) => {
             let other = |row: &usize| logged.get(*row) != course.actions.get(*row);
@@ -320,7 +322,15 @@ fn commands(of: Logged<'_>, course: &OutputCourse, wanted: Wanted) -> Option<Act
             others
         }
         (None, Some((span, logged))) => {
-            let near = |row: usize| Some((logged.get(row)? - course.duties.get(row)?).abs() <= tolerance * span);
+            let share = |row: usize| Some((logged.get(row)? - course.duties.get(row)?).abs() / span);
+            let near = |row: usize| Some(share(row)? <= tolerance);
+            let shares = (0..log.rows())
+                .filter(is_late)
+                .filter_map(|row| Some((share(row)?, row)));
+            let largest = shares
+                .filter(|(share, _)| share.is_finite())
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            worst = largest.map(|(share, row)| (share, log.line(row)));
             // what is no number is not near
             (0..log.rows())
                 .filter(is_late)
@@ -334,6 +344,7 @@ fn commands(of: Logged<'_>, course: &OutputCourse, wanted: Wanted) -> Option<Act
         ties,
         first_line: others.first().map(|row| log.line(*row)),
         exploring,
+        worst,
     })
 }
 

@@ -130,7 +130,11 @@ fn command_words(policy: &Policy, replay: &Replay, output: Commanded<'_>, path: 
             1 => ", 1 tie apart".to_owned(),
             ties => format!(", {} ties apart", grouped(ties as u64)),
         };
-        words.push(format!("{of}{command} equal in {equal} of {rows}{ties}{told}"));
+        let worst = actions.worst.map_or(String::new(), |(share, line)| match share > 0.0 {
+            true => format!(", largest difference {} of its range, in line {line}", number(share)),
+            false => ", to the last digit".to_owned(),
+        });
+        words.push(format!("{of}{command} equal in {equal} of {rows}{ties}{told}{worst}"));
         if actions.ties > 0 {
             words.push(format!(
                 "a tie: both actions have the same Q value within golden_tolerance, {} of the largest; a rounding chose between them",
@@ -286,11 +290,19 @@ fn equal(replay: &Replay, kind: &Kind, compared: usize, has_commands: bool) -> S
         (0, false) => "NOTHING COMPARED: the log has no observations and no actions".to_owned(),
         (0, true) => format!("equal: the {} (the log has no observations)", kind.noun),
         (compared, _) if compared < of => format!("equal: the {compared} of {of} features that the log has"),
-        _ => format!(
-            "equal: all {} within {} of their largest value",
-            counted(of, "feature"),
-            number(replay.tolerance)
-        ),
+        _ => {
+            let largest = |compared: &Compared| compared.range.iter().fold(0.0, |most: f64, end| most.max(end.abs()));
+            let is_rounded = |compared: &Compared| compared.worst > replay.tolerance * largest(compared);
+            let or_rounding = match replay.compared().any(|(_, compared)| is_rounded(compared)) {
+                true => ", or within the rounding of binary32 of what is subtracted there",
+                false => "",
+            };
+            format!(
+                "equal: all {} within {} of their largest value{or_rounding}",
+                counted(of, "feature"),
+                number(replay.tolerance)
+            )
+        }
     }
 }
 

@@ -33,35 +33,17 @@ pub fn broken(problem: &Problem) -> Option<String> {
 
 fn of(problem: &Problem, record: &Record) -> Option<String> {
     let ideal = Ideal::of(record, &problem.base.plant);
-    let points = (0..record.rows()).filter_map(|row| {
-        let (v, d) = (record.measured[0][row], record.duty[row]);
-        let i = ideal::drawn(&record.load[row], v);
-        // at a duty of 1 the form of a boost has no value
-        (v.is_finite() && d < 1.0 && ideal.never_rests(i, d)).then_some((v, d, i))
-    });
-    let points: Vec<Point> = points.collect();
+    let points: Vec<Point> = (0..record.rows())
+        .filter_map(|row| point(&ideal, record, row, record.measured[0][row]))
+        .collect();
     let columns = columns(ideal.topology, &points);
     let (count, terms) = (points.len() as f64, columns.len());
     if !record.settled || points.len() < terms + MORE {
         return None;
     }
     let v: Vec<f64> = points.iter().map(|p| p.0).collect();
-    let matrix: Vec<Vec<f64>> = columns
-        .iter()
-        .map(|a| columns.iter().map(|b| dot(a, b)).collect())
-        .collect();
-    let right: Vec<f64> = columns.iter().map(|a| dot(a, &v)).collect();
-    let weights = solve(&matrix, &right);
     let square = |left: f64| left * left;
-    let fitted = |n: usize| {
-        columns
-            .iter()
-            .zip(&weights)
-            .map(|(column, weight)| column[n] * weight)
-            .sum::<f64>()
-    };
-    let left: f64 = v.iter().enumerate().map(|(n, v)| square(v - fitted(n))).sum();
-    let rms = (left / (count - terms as f64)).sqrt();
+    let rms = (left(&columns, &v) / (count - terms as f64)).sqrt();
     if rms < LEFT * problem.bases.v {
         return None;
     }
@@ -85,6 +67,53 @@ fn of(problem: &Problem, record: &Record) -> Option<String> {
     Some(format!(
         "no {own} gives the points of {name}, whatever its losses: its voltage is {form}, and theirs is {rms} beside{looks}"
     ))
+}
+
+/// A row as a point, where the current never rests.
+fn point(ideal: &Ideal, record: &Record, row: usize, v: f64) -> Option<Point> {
+    let (d, i) = (record.duty[row], ideal::drawn(&record.load[row], v));
+    // at a duty of 1 the form of a boost has no value
+    (v.is_finite() && d < 1.0 && ideal.never_rests(i, d)).then_some((v, d, i))
+}
+
+/// Points beyond the terms of the form from which on they tell a noise: five degrees of freedom tell it to a third, and the noise of so few
+/// values counts half as much again ([`crate::noise`]).
+const TELLING: usize = 5;
+
+/// Standard deviation of `values`, one for each row of a settled record and 0 where nothing counts, beside what any losses may do: whatever the order
+/// of the rows. Rows that are written down duty by duty have other loads beside them, and their differences show the losses as noise.
+#[must_use]
+pub(crate) fn scatter(problem: &Problem, record: &Record, values: &[f64]) -> Option<f64> {
+    let ideal = Ideal::of(record, &problem.base.plant);
+    // without a measured voltage a constant power draws what it would at the middle one
+    let v_of = |row: usize| {
+        Some(record.measured[0][row])
+            .filter(|v| v.is_finite())
+            .unwrap_or(problem.bases.v)
+    };
+    let rows = (0..record.rows()).filter(|row| values.get(*row).is_some_and(|value| *value != 0.0));
+    let (points, values): (Vec<Point>, Vec<f64>) = rows
+        .filter_map(|row| Some((point(&ideal, record, row, v_of(row))?, values[row])))
+        .unzip();
+    let columns = columns(ideal.topology, &points);
+    let (count, terms) = (points.len(), columns.len());
+    (count >= terms + TELLING).then(|| (left(&columns, &values) / (count - terms) as f64).sqrt())
+}
+
+/// The sum of squares that the columns leave of some values.
+fn left(columns: &[Vec<f64>], values: &[f64]) -> f64 {
+    let matrix: Vec<Vec<f64>> = columns
+        .iter()
+        .map(|a| columns.iter().map(|b| dot(a, b)).collect())
+        .collect();
+    let right: Vec<f64> = columns.iter().map(|a| dot(a, values)).collect();
+    let weights = solve(&matrix, &right);
+    let fitted = |n: usize| {
+        let terms = columns.iter().zip(&weights);
+        terms.map(|(column, weight)| column[n] * weight).sum::<f64>()
+    };
+    let each = values.iter().enumerate().map(|(n, value)| value - fitted(n));
+    each.map(|left| left * left).sum()
 }
 
 /// The terms of the form at each point, around their means, so that the equations are well conditioned.

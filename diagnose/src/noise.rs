@@ -4,6 +4,7 @@ mod few;
 mod rings;
 mod spikes;
 
+use crate::balance;
 use crate::exact::Exact;
 use crate::flicker;
 use crate::median::middle;
@@ -51,7 +52,12 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             let digit = one.lattice[n].max(one.resolution[n]) / problem.sigma[n];
             // rows without a value are no meter that shows one all the time
             let measured: Vec<f64> = shown.iter().copied().filter(|v| *v != 0.0).collect();
-            scatter_of_ringing(&shown, |rows| rows.iter().all(|v| *v != 0.0)).max(flicker::noise(&measured, digit))
+            let seen =
+                scatter_of_ringing(&shown, |rows| rows.iter().all(|v| *v != 0.0)).max(flicker::noise(&measured, digit));
+            match one.settled {
+                true => balance::scatter(problem, one, &values).map_or(seen, |beside| beside.min(seen)),
+                false => seen,
+            }
         };
         // the median: one noisy record must not hide what the others show
         let typical = middle((0..problem.records.len()).map(of)) * few::unsure(problem, n);

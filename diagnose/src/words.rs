@@ -239,7 +239,10 @@ pub fn nearest(partial: &[Named], removed: f64, fits_training: bool, left: &[Str
     }
 }
 
-/// A duty that the edges of the gate take or give, where it is more than their usual scatter: a dead time that the model lacks by so
+/// Standard deviations of the voltage's noise that somebody sees who lays the model over the record. A convention.
+const SEEN: f64 = 3.0;
+
+/// A duty that the edges of the gate take or give, where it is more than their usual scatter or is seen in the voltage: a dead time that the model lacks by so
 /// little is taken for edges, and nobody would know.
 #[must_use]
 pub fn edges(found: &Examined) -> Option<String> {
@@ -249,10 +252,11 @@ pub fn edges(found: &Examined) -> Option<String> {
         .state()
         .starts
         .trim_or_none(problem.base.plant.converter.f_sw);
-    let known = problem.duty_accuracy();
-    (found.verdict != Verdict::Unexplained && trim.abs() > known).then(|| {
-        let p = &problem.base.plant.converter;
-        let node = p.topology.span(p.v_in, problem.bases.v);
+    let p = &problem.base.plant.converter;
+    let node = p.topology.span(p.v_in, problem.bases.v);
+    // or more than can be overlooked in the voltage
+    let is_seen = trim.abs() > problem.duty_accuracy() || (trim * node).abs() > SEEN * problem.sigma[0];
+    (found.verdict != Verdict::Unexplained && is_seen).then(|| {
         let [time, volts] = [(trim * problem.bases.t_sw, "s"), (trim * node, "V")]
             .map(|(value, unit)| si(value.abs(), unit));
         let (way, less) = if trim < 0.0 { ("lost", "more") } else { ("won", "less") };

@@ -160,9 +160,10 @@ fn too_slow(
     let policy = policy.clone().with_format(*format);
     if let Some(share) = bench.with_relu(&policy) {
         lines.push(format!(
-            "  = hint: trained with relu the same network takes {:.0} to {:.0} %",
+            "  = hint: trained with relu the same network takes {:.0} to {:.0} % in {} with {build}",
             100.0 * share.0,
-            100.0 * share.1
+            100.0 * share.1,
+            format.name()
         ));
     }
     match bench.widest(&policy) {

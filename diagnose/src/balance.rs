@@ -85,12 +85,9 @@ const TELLING: usize = 5;
 #[must_use]
 pub(crate) fn scatter(problem: &Problem, record: &Record, values: &[f64]) -> Option<f64> {
     let ideal = Ideal::of(record, &problem.base.plant);
-    // without a measured voltage a constant power draws what it would at the middle one
-    let v_of = |row: usize| {
-        Some(record.measured[0][row])
-            .filter(|v| v.is_finite())
-            .unwrap_or(problem.bases.v)
-    };
+    // what a resistor draws at the measured voltage holds that one's noise, which would then be explained by itself
+    let v_in = problem.base.plant.converter.v_in * record.v_in_ratio;
+    let v_of = |row: usize| ideal.topology.voltage(v_in, record.duty[row]);
     let rows = (0..record.rows()).filter(|row| values.get(*row).is_some_and(|value| *value != 0.0));
     let (points, values): (Vec<Point>, Vec<f64>) = rows
         .filter_map(|row| Some((point(&ideal, record, row, v_of(row))?, values[row])))

@@ -22,11 +22,14 @@ fn table(duties: &[f64], currents: &[f64], order: &dyn Fn(&mut Vec<(f64, f64)>))
     order(&mut points);
     let noise = &mut Noise(5);
     let [winding, lower, upper] = RESISTANCES;
-    let mut columns = ["duty", "v_out", "i_out"].map(|name| (name.to_owned(), Vec::new()));
+    let mut columns = ["duty", "v_out", "i_out", "v_in"].map(|name| (name.to_owned(), Vec::new()));
     for (d, i) in points {
         // the current's ripple squares out over a period to first order
         let v = d * V_IN - i * (winding + d * upper + (1.0 - d) * lower);
-        for (column, value) in columns.iter_mut().zip([d, v + 1e-3 * noise.normal(), i]) {
+        for (column, value) in columns
+            .iter_mut()
+            .zip([d, v + 1e-3 * noise.normal(), i, V_IN + 2e-3 * noise.normal()])
+        {
             column.1.push(value);
         }
     }

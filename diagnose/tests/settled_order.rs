@@ -13,9 +13,13 @@ const V_IN: f64 = 12.0;
 /// Of the winding, of the lower and of the upper switch, ohm; the model has 11 mohm for the last.
 const RESISTANCES: [f64; 3] = [7e-3, 6e-3, 31e-3];
 
+/// Duty and current of each point, and what puts them into an order.
+type Points = Vec<(f64, f64)>;
+type Order = dyn Fn(&mut Points);
+
 /// Means of a synchronous buck that never rests: Kirchhoff's law over a period. In `order`, with a noise of 1 mV.
-fn table(duties: &[f64], currents: &[f64], order: &dyn Fn(&mut Vec<(f64, f64)>)) -> Table {
-    let mut points: Vec<(f64, f64)> = duties
+fn table(duties: &[f64], currents: &[f64], order: &Order) -> Table {
+    let mut points: Points = duties
         .iter()
         .flat_map(|d| currents.iter().map(move |i| (*d, *i)))
         .collect();
@@ -42,7 +46,7 @@ fn model() -> Parameters {
     Parameters::from_toml("plant.toml".as_ref(), text).unwrap()
 }
 
-fn found(duties: &[f64], currents: &[f64], order: &dyn Fn(&mut Vec<(f64, f64)>)) -> Findings {
+fn found(duties: &[f64], currents: &[f64], order: &Order) -> Findings {
     let record = table(duties, currents, order).read("sweep", &model()).unwrap();
     diagnose(&model(), vec![record], &[], &|_| ()).findings
 }
@@ -50,8 +54,8 @@ fn found(duties: &[f64], currents: &[f64], order: &dyn Fn(&mut Vec<(f64, f64)>))
 #[test]
 fn a_sweep_says_the_same_duty_by_duty_and_load_by_load() {
     let (duties, currents) = ([0.22, 0.26, 0.30, 0.34, 0.38], [1.0, 4.0, 8.0, 12.0]);
-    let by_duty: &dyn Fn(&mut Vec<(f64, f64)>) = &|_| ();
-    let by_load: &dyn Fn(&mut Vec<(f64, f64)>) = &|points| points.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let by_duty: &Order = &|_| ();
+    let by_load: &Order = &|points| points.sort_by(|a, b| a.1.total_cmp(&b.1));
     for order in [by_duty, by_load] {
         let findings = found(&duties, &currents, order);
         assert_eq!(findings.verdict, Verdict::Explained, "{}", findings.sentence);

@@ -322,11 +322,12 @@ fn commands(of: Logged<'_>, course: &OutputCourse, wanted: Wanted) -> Option<Act
             others
         }
         (None, Some((span, logged))) => {
-            let share = |row: usize| Some((logged.get(row)? - course.duties.get(row)?).abs() / span);
-            let near = |row: usize| Some(share(row)? <= tolerance);
+            let apart = |row: usize| Some((logged.get(row)? - course.duties.get(row)?).abs());
+            // by the product: of a range that is one duty there is no share
+            let near = |row: usize| Some(apart(row)? <= tolerance * span);
             let shares = (0..log.rows())
                 .filter(is_late)
-                .filter_map(|row| Some((share(row)?, row)));
+                .filter_map(|row| Some((apart(row)? / span, row)));
             let largest = shares
                 .filter(|(share, _)| share.is_finite())
                 .max_by(|a, b| a.0.total_cmp(&b.0));

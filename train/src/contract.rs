@@ -81,8 +81,16 @@ impl Contract {
     /// # Errors
     /// If the file cannot be read or is not a sound contract.
     pub fn load_any(path: &Path, hidden: &[usize]) -> Result<Self, Error> {
+        let bytes = std::fs::read(path).map_err(|error| Error::from(of_file(path, &error)))?;
+        Self::read(path, String::from_utf8_lossy(&bytes).into_owned(), hidden)
+    }
+
+    /// [`Contract::load_any`] of a text; `path` names it in faults, and a mapping is read beside it.
+    ///
+    /// # Errors
+    /// As [`Contract::load_any`].
+    pub fn read(path: &Path, text: String, hidden: &[usize]) -> Result<Self, Error> {
         let read = |path: &Path| std::fs::read(path).map_err(|error| Error::from(of_file(path, &error)));
-        let text = String::from_utf8_lossy(&read(path)?).into_owned();
         let sketch = sketch(&text);
         if !sketch.several.is_empty() {
             return Err(Fault::in_file(path, several(&sketch.several)).into());

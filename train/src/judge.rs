@@ -16,8 +16,9 @@ use crate::learner::greedy;
 use crate::network::Network;
 use crate::quick::{Quick, Scratch};
 use crate::score::{Score, Scoring};
-use crate::settings::Requirement;
+use crate::settings::{Requirement, Settings};
 use crate::trainer::Trainer;
+use crate::verdict::{Verdict, verdicts};
 use closed_loop::Agent;
 use closed_loop::environment::{Environment, Start, Varied};
 use closed_loop::scenario::{Finding, survey_all};
@@ -42,29 +43,61 @@ pub struct Judged {
     pub score: Score,
     /// Load step by load step.
     pub findings: Vec<Finding>,
+    /// Limit by limit.
+    pub verdicts: Vec<Verdict>,
+}
+
+/// The plant as its file says, and those of the spread.
+fn places<'a, E: Environment>(settings: &'a Settings, nominal: &E) -> Vec<Place<'a, E>> {
+    let general = &settings.specification;
+    let place = |name, numbers, specification| Place {
+        name,
+        converter: Varied::new(nominal, numbers),
+        specification,
+    };
+    let others = settings.spread.iter().map(|spread| {
+        let numbers = spread.numbers(|key| nominal.parameter(key));
+        let own = if spread.limits.is_empty() {
+            general
+        } else {
+            &spread.limits
+        };
+        place(spread.name(), numbers, own.as_slice())
+    });
+    std::iter::once(place(String::new(), Vec::new(), general.as_slice()))
+        .chain(others)
+        .collect()
+}
+
+/// The evaluation of a policy, the plant as its file says first; the limits are as they are, without the margin of the
+/// selection, which only makes the choice stricter than the verdict.
+///
+/// # Errors
+/// If the policy measures something that the plant does not have, or a converter of the spread cannot be started.
+pub(crate) fn evaluate<E: Environment>(
+    settings: &Settings,
+    nominal: &E,
+    policy: &Policy,
+) -> Result<Vec<Judged>, Error> {
+    let task = &settings.evaluation;
+    let controller = of_policy(policy)?;
+    let judged = |place: Place<'_, E>| {
+        let v_ref = settings.reward.v_ref;
+        let findings = survey_all(&place.converter, &controller, v_ref, task, &task.all_instants())?;
+        Ok(Judged {
+            score: Scoring::new(&task.load_steps, place.specification, 1.0).score(&findings),
+            verdicts: verdicts(&place.name, place.specification, &task.load_steps, &findings),
+            place: place.name,
+            findings,
+        })
+    };
+    places(settings, nominal).into_iter().map(judged).collect()
 }
 
 impl<E: Environment> Trainer<E> {
     /// The plant as its file says, and those of the spread.
     pub(crate) fn places(&self) -> Vec<Place<'_, E>> {
-        let general = &self.settings.specification;
-        let place = |name, numbers, specification| Place {
-            name,
-            converter: Varied::new(&self.nominal, numbers),
-            specification,
-        };
-        let others = self.settings.spread.iter().map(|spread| {
-            let numbers = spread.numbers(|key| self.nominal.parameter(key));
-            let own = if spread.limits.is_empty() {
-                general
-            } else {
-                &spread.limits
-            };
-            place(spread.name(), numbers, own.as_slice())
-        });
-        std::iter::once(place(String::new(), Vec::new(), general.as_slice()))
-            .chain(others)
-            .collect()
+        places(&self.settings, &self.nominal)
     }
 
     /// Starts each converter of the spread once, so that numbers that make none are told before the training.
@@ -81,21 +114,9 @@ impl<E: Environment> Trainer<E> {
         Ok(())
     }
 
-    /// The evaluation of a policy, the plant as its file says first; the limits are as they are, without the margin of the
-    /// selection, which only makes the choice stricter than the verdict.
+    /// [`evaluate`] of a policy of this training.
     pub(crate) fn evaluate(&self, policy: &Policy) -> Result<Vec<Judged>, Error> {
-        let task = &self.settings.evaluation;
-        let controller = of_policy(policy)?;
-        let judged = |place: Place<'_, E>| {
-            let v_ref = self.settings.reward.v_ref;
-            let findings = survey_all(&place.converter, &controller, v_ref, task, &task.all_instants())?;
-            Ok(Judged {
-                score: Scoring::new(&task.load_steps, place.specification, 1.0).score(&findings),
-                place: place.name,
-                findings,
-            })
-        };
-        self.places().into_iter().map(judged).collect()
+        evaluate(&self.settings, &self.nominal, policy)
     }
 }
 

@@ -35,6 +35,7 @@ pub mod summary;
 pub mod tensorboard;
 pub mod trainer;
 mod trials;
+pub mod verdict;
 mod waiting;
 
 pub use closed_loop::scenario::Metrics;

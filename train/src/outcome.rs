@@ -11,9 +11,9 @@ use crate::contract::{Files, GoldenVectors};
 use crate::faults::Error;
 use crate::judge::{Judged, overall};
 use crate::network::Network;
-use crate::score::{Score, Scoring, figures};
-use crate::settings::{Instants, Requirement};
+use crate::score::Score;
 use crate::trainer::{Best, Ended, Look, Trainer};
+use crate::verdict::Verdict;
 use closed_loop::Agent;
 use closed_loop::environment::Environment;
 use closed_loop::scenario::{Finding, load_step};
@@ -73,16 +73,22 @@ impl<E: Environment> Trainer<E> {
                 .into());
         };
         let policy = self.contract.with(&best.network);
-        let judged = self.evaluate(&policy)?;
+        let mut judged = self.evaluate(&policy)?;
         let law = policy
             .law_alone()
             .map(|law| self.evaluate(&law))
             .transpose()?
             .unwrap_or_default();
+        let mut best = best.clone();
+        let passed_over = !law.is_empty() && overall(&law).met && !overall(&judged).met;
+        if passed_over && let Some(nothing) = self.law(&mut self.told.clone())? {
+            // on its own load steps the selection preferred a network; nobody wants one that misses what the law keeps
+            (best, judged) = (nothing, law.clone());
+        }
         let evaluated = overall(&judged);
         let golden = self.golden(&best.network)?;
         let (policy, mut files) = self.contract.folder(&best.network, &golden)?;
-        let report = self.report(ended, best, &judged, &law);
+        let report = self.report(ended, &best, passed_over, &judged, &law);
         let findings = judged
             .first()
             .map(|nominal| nominal.findings.clone())
@@ -136,7 +142,7 @@ impl<E: Environment> Trainer<E> {
         Ok(golden_vectors(network, &observations))
     }
 
-    fn report(&self, ended: Ended, best: &Best, judged: &[Judged], law: &[Judged]) -> String {
+    fn report(&self, ended: Ended, best: &Best, passed_over: bool, judged: &[Judged], law: &[Judged]) -> String {
         let mut out = String::new();
         let ended = match ended {
             Ended::Met => "the selection scenarios met the specification",
@@ -151,6 +157,10 @@ impl<E: Environment> Trainer<E> {
             format!("network     {actions}"),
             format!("training    {steps} control periods: {ended}"),
             match best.step {
+                0 if passed_over => format!(
+                    "kept        the law alone, cost {:.4}: the network of the selection misses the specification in the evaluation",
+                    best.score.cost
+                ),
                 0 => format!(
                     "kept        the law alone, cost {:.4}: no network did better",
                     best.score.cost
@@ -169,41 +179,19 @@ impl<E: Environment> Trainer<E> {
             let verdict = if overall(judged).met { "met" } else { "NOT met" };
             // writing to a String cannot fail
             let _ = writeln!(out, "\nSpecification: {verdict}");
-            for (place, judged) in self.places().iter().zip(judged) {
-                if !place.name.is_empty() {
-                    let _ = writeln!(out, "on {}", place.name);
-                }
-                out.push_str(&self.verdicts(place.specification, &judged.findings));
+            for verdict in judged.iter().flat_map(|judged| &judged.verdicts) {
+                let word = if verdict.holds() { "holds" } else { "FAILS" };
+                let _ = writeln!(out, "  {word}  {verdict}");
             }
         }
         out
     }
+}
 
-    /// One line per limit.
-    fn verdicts(&self, specification: &[Requirement], findings: &[Finding]) -> String {
-        let mut out = String::new();
-        let scoring = Scoring::new(&self.settings.evaluation.load_steps, specification, 1.0);
-        for requirement in specification {
-            for (_, finding) in findings
-                .iter()
-                .enumerate()
-                .filter(|(n, _)| scoring.concerns(requirement, *n))
-            {
-                let (metrics, instants) = match requirement.instants {
-                    Instants::Sample => (&finding.at_sample, "at sampling instants"),
-                    Instants::Worst => (&finding.worst, "at all instants"),
-                };
-                let [from, to] = finding.load_step;
-                for (key, value, limit) in figures(metrics, requirement) {
-                    let verdict = if value <= limit { "holds" } else { "FAILS" };
-                    let _ = writeln!(
-                        out,
-                        "  {verdict}  {from} -> {to} W {instants}: {key} {value:.6} of {limit}"
-                    );
-                }
-            }
-        }
-        out
+impl Outcome {
+    /// All limits of the specification on all converters of the evaluation.
+    pub fn verdicts(&self) -> impl Iterator<Item = &Verdict> {
+        self.judged.iter().flat_map(|judged| &judged.verdicts)
     }
 }
 

@@ -1,5 +1,7 @@
 //! `report.html` of a training: all seeds, the specification, and what the best policy decides.
 
+use std::collections::BTreeMap;
+
 use closed_loop::{Converter, decision_map, digits, time_digits};
 use policy::Policy;
 use report::{Axis, Chart, HeatMap, Page, Panel, Ramp, Section, Series, Svg, Table, Verdict, grouped};
@@ -7,11 +9,11 @@ use report::{Axis, Chart, HeatMap, Page, Panel, Ramp, Section, Series, Svg, Tabl
 use crate::faults::Error;
 use crate::outcome::Outcome;
 use crate::rest_page::around_rest;
-use crate::score::{Scoring, figures};
 use crate::seeds::SeedRun;
-use crate::settings::{Instants, Requirement, Settings};
+use crate::settings::{Instants, Settings};
 use crate::summary::Worst;
 use crate::trainer::Look;
+use crate::verdict::{self, Verdict as Limit};
 
 /// Cells of the map along each side: smooth to the eye, and a moment's work.
 const CELLS: usize = 60;
@@ -32,7 +34,7 @@ pub fn page(settings: &Settings, runs: &[SeedRun], best: &Outcome, converter: &C
         .verdict(verdict, sentence(settings, runs, best))
         .section(seeds(settings, runs, best));
     if !settings.specification.is_empty() {
-        page = page.section(specification(settings, best));
+        page = page.section(specification(best));
     }
     let caption = "The duty before mapping and limits after a long rest at one measurement; all other signals in the middle of their range.";
     let mut decided = Section::new("What the best policy decides");
@@ -163,66 +165,53 @@ fn costs(settings: &Settings, runs: &[SeedRun]) -> Result<Svg, report::ReportErr
         .svg()
 }
 
-/// Every limit, and the figure of the best seed's evaluation that comes nearest to it or exceeds it most.
-fn specification(settings: &Settings, best: &Outcome) -> Section {
-    let mut table = Table::new("The evaluation of the best seed; of each limit the load step that comes nearest to it")
+/// Every limit on every converter, and the figure of the best seed's evaluation that comes nearest to it or exceeds it most.
+fn specification(best: &Outcome) -> Section {
+    let spread = best.judged.len() > 1;
+    let mut table = Table::new("The evaluation of the best seed; of each limit the load step that comes nearest to it");
+    if spread {
+        table = table.text("converter");
+    }
+    table = table
         .text("limit of")
-        .text("load steps")
+        .text("instants")
         .text("holds")
         .text("found")
         .text("limit")
         .text("at");
-    let scoring = Scoring::new(&settings.evaluation.load_steps, &settings.specification, 1.0);
-    for requirement in &settings.specification {
-        let of = |n: usize| {
-            let finding = &best.findings[n];
-            let metrics = match requirement.instants {
-                Instants::Sample => &finding.at_sample,
-                Instants::Worst => &finding.worst,
-            };
-            figures(metrics, requirement)
-        };
-        let concerned: Vec<usize> = (0..best.findings.len())
-            .filter(|n| scoring.concerns(requirement, *n))
-            .collect();
-        let Some(first) = concerned.first() else { continue };
-        for (row, (name, _, limit)) in of(*first).into_iter().enumerate() {
-            let value = |n: &usize| of(*n).get(row).map_or(f64::NAN, |(_, value, _)| *value);
-            let Some(worst) = concerned.iter().max_by(|a, b| value(a).total_cmp(&value(b))) else {
-                continue;
-            };
-            let found = value(worst);
-            table = table.row([
-                name.into(),
-                words(requirement).into(),
-                if found <= limit { "yes" } else { "NO" }.into(),
-                report::quantity(found, unit(name), 4).into(),
-                report::quantity(limit, unit(name), 4).into(),
-                best.findings[*worst].step().to_string().into(),
-            ]);
+    // in the order of the training file, and the largest figure of each limit
+    let mut tightest: BTreeMap<(usize, usize, &str), &Limit> = BTreeMap::new();
+    for (place, judged) in best.judged.iter().enumerate() {
+        for verdict in &judged.verdicts {
+            let kept = tightest.entry((place, verdict.spec, verdict.figure)).or_insert(verdict);
+            if verdict.found.total_cmp(&kept.found).is_gt() {
+                *kept = verdict;
+            }
         }
     }
+    for verdict in tightest.into_values() {
+        let [from, to] = verdict.load_step;
+        let unit = verdict::unit(verdict.figure);
+        let converter = match verdict.converter.as_str() {
+            "" => "as in the plant file",
+            other => other,
+        };
+        let cells = [
+            converter.into(),
+            verdict.figure.into(),
+            match verdict.instants {
+                Instants::Sample => "sampling",
+                Instants::Worst => "all",
+            }
+            .into(),
+            if verdict.holds() { "yes" } else { "NO" }.into(),
+            report::quantity(verdict.found, unit, 4).into(),
+            report::quantity(verdict.limit, unit, 4).into(),
+            format!("{from} -> {to} {}", verdict.unit).into(),
+        ];
+        table = table.row(cells.into_iter().skip(usize::from(!spread)));
+    }
     Section::new("Specification").table(table)
-}
-
-/// Of a figure that is limited, by its key in the training file.
-fn unit(key: &str) -> &'static str {
-    match key {
-        "deviation" | "tail" => "V",
-        "settling" => "s",
-        _ => "",
-    }
-}
-
-fn words(requirement: &Requirement) -> String {
-    let steps = match requirement.load_step {
-        Some([from, to]) => format!("{from} to {to} W"),
-        None => "all".to_owned(),
-    };
-    match requirement.instants {
-        Instants::Sample => format!("{steps}, at sampling instants"),
-        Instants::Worst => format!("{steps}, all instants"),
-    }
 }
 
 /// The duty over the first two signals of the contract; nothing with fewer.

@@ -170,15 +170,18 @@ fn one<E: Environment>(
     Ok(run)
 }
 
-/// The run whose policy did best on the selection scenarios; the first among equals.
+/// The run whose policy did best on the selection scenarios, of those that meet the specification in their evaluation if there is
+/// one; the first among equals.
 #[must_use]
 pub fn best(runs: &[SeedRun]) -> Option<&Outcome> {
     let outcomes = runs.iter().filter_map(|run| run.outcome.as_ref());
     outcomes.min_by(|a, b| {
-        // by the selection: chosen by the evaluation, the evaluation would no longer be independent
-        let order = |outcome: &Outcome| (!outcome.selected.met, outcome.selected.cost);
-        let ((a_open, a_cost), (b_open, b_cost)) = (order(a), order(b));
-        a_open.cmp(&b_open).then(a_cost.total_cmp(&b_cost))
+        // the evaluation opens or shuts the door and no more: ranked by its figures, they would be those of a choice among many
+        let order = |outcome: &Outcome| (!outcome.evaluated.met, !outcome.selected.met, outcome.selected.cost);
+        let ((a_shut, a_open, a_cost), (b_shut, b_open, b_cost)) = (order(a), order(b));
+        (a_shut.cmp(&b_shut))
+            .then(a_open.cmp(&b_open))
+            .then(a_cost.total_cmp(&b_cost))
     })
 }
 

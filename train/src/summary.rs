@@ -9,12 +9,15 @@ use crate::score::Score;
 use crate::seeds::SeedRun;
 use crate::settings::Settings;
 use crate::trainer::Ended;
+use crate::verdict::{Verdict, missed};
 
 /// All seeds, and the evaluation of the best one. Figures that are not finite are null in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// Whether the best seed's evaluation meets the specification; `None` without a specification.
     pub met: Option<bool>,
+    /// The limits that the best seed's evaluation misses, the one that is exceeded most first.
+    pub missed: Vec<Verdict>,
     /// The seed that did best on the selection scenarios; `None` before the first look.
     pub best_seed: Option<u64>,
     /// Of all seeds together.
@@ -118,6 +121,7 @@ impl Summary {
         let met = best.map(|best| best.evaluated.met);
         Self {
             met: met.filter(|_| !settings.specification.is_empty()),
+            missed: best.map_or_else(Vec::new, |best| missed(best.verdicts()).into_iter().cloned().collect()),
             best_seed: best.map(|best| best.seed),
             control_periods: runs.iter().map(|run| run.steps).sum(),
             seeds: seeds.map(|(seed, run)| Seed::of(*seed, run)).collect(),

@@ -112,22 +112,29 @@ impl<E: Environment> Trainer<E> {
 
     /// A law that networks add to is the first candidate: what does no better than it is not kept, and does not end the training.
     fn begin_with_the_law(&mut self) -> Result<(), Error> {
-        let Some(network) = self.contract.adds_nothing() else {
-            return Ok(());
-        };
         let mut told = self.told.clone();
+        if let Some(law) = self.law(&mut told)? {
+            self.told = told;
+            self.best = Some(law);
+        }
+        Ok(())
+    }
+
+    /// A network that adds nothing to the law, judged on the selection scenarios; `None` without such a law.
+    pub(crate) fn law(&self, told: &mut Told) -> Result<Option<Best>, Error> {
+        let Some(network) = self.contract.adds_nothing() else {
+            return Ok(None);
+        };
         let mut judging = self.judging(&network)?;
-        judging.advance(f64::INFINITY, usize::MAX, &mut told)?;
+        judging.advance(f64::INFINITY, usize::MAX, told)?;
         let score = judging.bound;
         drop(judging);
-        self.told = told;
-        self.best = Some(Best {
+        Ok(Some(Best {
             step: 0,
             second: false,
             score,
             network,
-        });
-        Ok(())
+        }))
     }
 
     /// Control periods so far.

@@ -46,6 +46,8 @@ pub struct Nominal {
     pub give: f64,
     /// What the duty switches to the inductor at rest, V.
     pub span: f64,
+    /// What the largest load costs at the inductor by resistances and diodes of the plant, V: an upper estimate.
+    pub losses: f64,
     /// Current per volt of error that a loop of the voltage asks for where there is a zero in the right half-plane, A/V.
     pub asked: f64,
 }
@@ -100,6 +102,11 @@ impl Nominal {
             rest: design.rest(),
             give: design.give(),
             span: design.span(),
+            losses: {
+                let (inductor, switch) = (&plant.inductor, &plant.switch);
+                let resistance = inductor.dcr + f64::max(switch.r_ds_on, switch.r_ds_on_low);
+                switch.v_f + resistance * load / design.give()
+            },
             asked: match topology {
                 Topology::Buck => 0.0,
                 Topology::Boost | Topology::BuckBoost => SHARE * design.by_voltage(load),

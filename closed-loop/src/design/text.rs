@@ -75,8 +75,9 @@ impl Design {
         let [current, voltage, bias] = self.filter.gains.map(short);
         let reach = self.reach();
         let lowest = if own.has_diode { 0.0 } else { -reach };
-        // at the inductor: what a tenth of the source would be lost to
-        let most_bias = rounded(0.1 * own.v_in, 2);
+        // at the inductor: what a tenth of the source would be lost to, or twice what the plant file says is lost. At low voltages a
+        // diode alone takes more than a tenth
+        let most_bias = rounded(f64::max(0.1 * own.v_in, 2.0 * own.losses), 2);
         format!(
             "[[observer]]\n\
              name = \"model\"\n\

@@ -219,7 +219,8 @@ pub struct Limits {
 }
 
 /// Which of a load step's instants a requirement speaks of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Instants {
     /// The first: the load changes at a sampling instant.
     Sample,

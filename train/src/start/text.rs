@@ -74,7 +74,7 @@ impl Start {
                 _ => String::new(),
             },
             self.i_out.signal("i_out", "A"),
-            base.observer(),
+            self.observer(),
             [
                 feature("e", &error, rounded(volts, 3), [-5.0, 5.0]),
                 feature("e_fine", &error, rounded(6.7 * volts, 3), [-2.0, 2.0]),
@@ -89,6 +89,18 @@ impl Start {
             rounded(1.0 / amperes, 2),
             rounded(base.nominal().rest, 3),
         )
+    }
+
+    /// The observer, with the reason for its gain of the bias where that is not the usual one.
+    fn observer(&self) -> String {
+        let table = self.base.observer();
+        match self.bias {
+            1.0 => table,
+            times => format!(
+                "# the bias follows faster than usual ({times} times the usual noise of the model), for the losses of the plant file move it with\n\
+                 # the load: so the law alone settles soonest\n{table}"
+            ),
+        }
     }
 
     /// The training file; `contract` and `plant` are paths as seen from its folder.

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use toml_input::{FileName, Message};
 use train::summary::Summary;
+use train::verdict::missed;
 use train::{
     Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, page, seeds, tables, train_converter,
 };
@@ -32,6 +33,8 @@ use tensorboard::Events;
 /// Time between two checkpoints on the way. A kill or a power cut may cost five seconds of work; the rest is for a look at
 /// the selection scenarios and for writing.
 const CHECKPOINT_EVERY: Duration = Duration::from_secs(3);
+/// Limits that are said in the terminal: those that are exceeded most. A screen.
+const SHOWN: usize = 8;
 const SEEDS: &str = "seeds";
 const PAGE: &str = "report.html";
 
@@ -184,6 +187,9 @@ fn report(
         best.seed,
         tables(&best.judged, &best.law)
     ));
+    if missed {
+        text.push_str(&limits(best));
+    }
     text.push_str(&format!(
         "\n{} control periods in {seconds:.1} s; policy in {out}, all seeds in {out}/{SEEDS}; to look at: {out}/{PAGE}\n\
          next: policyc verify {out}",
@@ -191,6 +197,24 @@ fn report(
     ));
     output::say(&text)?;
     Ok(outcome)
+}
+
+/// Which limits were missed, and what there is to do.
+fn limits(best: &Trained) -> String {
+    let missed = missed(best.verdicts());
+    let mut text = format!(
+        "\nThe specification is missed: {} of {} limits\n",
+        missed.len(),
+        best.verdicts().count()
+    );
+    for verdict in missed.iter().take(SHOWN) {
+        text.push_str(&format!("  {verdict}\n"));
+    }
+    if missed.len() > SHOWN {
+        text.push_str(&format!("  and {} more, in report.txt\n", missed.len() - SHOWN));
+    }
+    text.push_str("what to do: docs/how-to/missed-specification.md\n");
+    text
 }
 
 fn interrupted(

@@ -184,6 +184,24 @@ impl Problem {
     }
 }
 
+/// What is moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moving {
+    /// All that is free.
+    All,
+    /// All but the initial currents. Where the current stops in every period the first one is forgotten after it: what is left is a
+    /// charge, as its square, and tells nothing that the initial voltage does not. A line along both leads far away.
+    AllButCurrents,
+}
+
+impl Moving {
+    /// In the order in which they are tried.
+    pub const EACH: [Moving; 2] = [Moving::All, Moving::AllButCurrents];
+}
+
+/// Place of the initial current among the columns of a span.
+const CURRENT: usize = 1;
+
 impl Span {
     /// Takes a column in: what the others before it do not hold, at length 1.
     fn add(&mut self, mut column: Vec<f64>) {
@@ -200,11 +218,12 @@ impl Span {
     }
 
     /// The estimates' moves that explain most of `part`.
-    fn moves(&self, part: &[f64]) -> Vec<f64> {
+    fn moves(&self, part: &[f64], moving: Moving) -> Vec<f64> {
         let mut left: Vec<f64> = self.q.iter().map(|q| dot(q, part)).collect();
         for column in (0..left.len()).rev() {
             let r = &self.r[column];
-            left[column] = if r[column] > 0.0 { left[column] / r[column] } else { 0.0 };
+            let moves = r[column] > 0.0 && (column != CURRENT || moving == Moving::All);
+            left[column] = if moves { left[column] / r[column] } else { 0.0 };
             let by = left[column];
             for row in 0..column {
                 left[row] -= r[row] * by;
@@ -257,7 +276,7 @@ impl Basis {
     }
 
     /// Moves `starts` to where they explain most of `u`, a residual.
-    pub fn absorb(&self, u: &[f64], starts: &mut Starts) {
+    pub fn absorb(&self, u: &[f64], starts: &mut Starts, moving: Moving) {
         let mut rest = Vec::new();
         // the last first: none of those before it holds a part of it
         for across in self.across.iter().rev() {
@@ -273,7 +292,7 @@ impl Basis {
         }
         let u = if rest.is_empty() { u } else { &rest[..] };
         for span in &self.spans {
-            let moves = span.moves(&u[span.from..span.to]);
+            let moves = span.moves(&u[span.from..span.to], moving);
             let start = &mut starts.states[span.record][span.segment];
             start[0] = (start[0] + moves[0]).max(0.0);
             start[1] += moves[1];

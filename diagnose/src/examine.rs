@@ -18,6 +18,7 @@ use crate::record::Record;
 use crate::rivals::{self, RivalValue};
 use crate::sampling;
 use crate::shape::{Structure, structures};
+use crate::sides;
 use crate::timing::{self, Timing};
 use crate::unsure_levels;
 use crate::work::Work;
@@ -282,6 +283,9 @@ fn prepared(train: Vec<Record>, base: &Model, work: &Work) -> (Problem, State, V
     let mut problem = Problem::new(train, base.clone());
     problem.work = work.clone();
     let mut null = State::settle(&problem, base, &problem.first_starts(), None);
+    if sides::leave_out(&mut problem, &null) {
+        null = State::settle(&problem, base, &null.starts, None);
+    }
     // noise before the instants of loggers and before outliers, which are judged in its units; and again without the
     // outliers
     problem.sigma = noise::sigma(&problem, &null.residual);

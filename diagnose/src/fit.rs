@@ -9,7 +9,7 @@
 //!
 //! Invariant: values stay within their ranges, and chi-square only falls.
 
-use crate::basis::Basis;
+use crate::basis::{Basis, Moving};
 use crate::causes::{Candidate, Search};
 use crate::drive::Model;
 use crate::normal::Normal;
@@ -101,14 +101,16 @@ impl State {
                     &own
                 }
             };
-            let mut starts = state.starts.clone();
-            basis.absorb(&state.residual, &mut starts);
-            let next = Self::at(problem, model, starts);
-            let gain = state.chi2 - next.chi2;
             // linear in the initial states only near them: a step that costs is not taken
-            if gain > 0.0 {
-                state = next;
-            }
+            let next = Moving::EACH.into_iter().find_map(|moving| {
+                let mut starts = state.starts.clone();
+                basis.absorb(&state.residual, &mut starts, moving);
+                let next = Self::at(problem, model, starts);
+                (next.chi2 < state.chi2).then_some(next)
+            });
+            let Some(next) = next else { break };
+            let gain = state.chi2 - next.chi2;
+            state = next;
             if gain < SMALL_GAIN {
                 break;
             }
@@ -342,10 +344,13 @@ impl Fitter<'_> {
                 axpy(&mut left, -(moved[*n] - values[*n]) / unit, &round.jacobian.raw[k]);
                 self.set(&mut model, place, moved[*n]);
             }
-            let mut starts = state.starts.clone();
-            self.basis.absorb(&left, &mut starts);
-            let next = State::at(self.problem, &model, starts);
-            if next.chi2 < state.chi2 {
+            let next = Moving::EACH.into_iter().find_map(|moving| {
+                let mut starts = state.starts.clone();
+                self.basis.absorb(&left, &mut starts, moving);
+                let next = State::at(self.problem, &model, starts);
+                (next.chi2 < state.chi2).then_some(next)
+            });
+            if let Some(next) = next {
                 // below that a step is Gauss and Newton's anyway, and damping would only take longer to come back
                 *damping = (*damping * 0.1).max(1e-9);
                 return Some((next, moved));

@@ -12,6 +12,7 @@ use crate::noise;
 use crate::problem::{Problem, dot};
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Record};
 use crate::sampling;
+use crate::sides;
 use crate::unsure_levels;
 use crate::words::{noise as noise_said, si};
 
@@ -155,6 +156,9 @@ pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHA
     sampling::decide(&mut problem, extended);
     let mut remarks = other_chains(&mut problem, base, extended, trim);
     let mut before = State::settle(&problem, base, &problem.first_starts(), None);
+    if sides::leave_out(&mut problem, &before) {
+        before = State::settle(&problem, base, &before.starts, None);
+    }
     let spikes = noise::outliers(&problem, &before.residual);
     if !spikes.is_empty() {
         remarks.extend(noise::spikes(&problem, &spikes));

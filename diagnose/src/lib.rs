@@ -65,6 +65,7 @@ pub mod rivals;
 mod sampling;
 mod search;
 pub mod shape;
+mod sides;
 mod slopes;
 mod small;
 mod spectrum;

@@ -233,3 +233,58 @@ fn a_boost_that_is_sampled_at_its_edge_is_judged_by_its_current_there() {
     let inductance = found.causes[0].parameters["inductance"].value;
     assert!((inductance / 21e-6 - 1.0).abs() < 0.01, "{}", found.sentence);
 }
+
+#[test]
+fn rows_behind_the_edge_at_the_start_of_the_period_are_left_out() {
+    let model = model(&format!(
+        "[converter]\ntopology = \"boost\"\nrectifier = \"synchronous\"\nv_in = 24.0\ninductance = 33e-6\ncapacitance = 220e-6\nf_sw = 100e3\n\
+         [inductor]\ndcr = {R}\n[capacitor]\nesr = {ESR}\n"
+    ));
+    // large currents, whose leap of ESR times current is far above the noise
+    let courses: [&Course; 3] = [
+        &[
+            (0, 0.5, 10.0),
+            (100, 0.51, 10.0),
+            (200, 0.49, 10.0),
+            (300, 0.505, 10.0),
+            (400, 0.495, 10.0),
+        ],
+        &[(0, 0.5, 10.0), (100, 0.5, 15.0), (200, 0.5, 20.0), (300, 0.5, 12.0)],
+        &[
+            (0, 0.5, 10.0),
+            (150, 0.495, 10.0),
+            (250, 0.495, 16.0),
+            (400, 0.508, 16.0),
+        ],
+    ];
+    // the trigger hesitates in every second row of the first record from its middle on, and in some rows of the second
+    let is_late = |n: usize, row: usize| match n {
+        0 => row > 300 && row % 2 == 0,
+        1 => matches!(row, 50..54 | 333 | 420..440),
+        _ => false,
+    };
+    let read = |n: usize| {
+        let row = std::cell::Cell::new(-4001_isize);
+        let pieces = |duty: f64| {
+            row.set(row.get() + 1);
+            let late = usize::try_from(row.get()).is_ok_and(|row| is_late(n, row));
+            vec![(late, 0.0, Some(late)), (true, duty, None), (false, 1.0 - duty, None)]
+        };
+        let table = record(BOOST, courses[n], 0.0, &pieces, [6e-3, 0.05], 51 + n as u64);
+        table.read(["duty", "load", "held"][n], &model).unwrap()
+    };
+    let found = diagnose(&model, vec![read(0), read(1)], &[read(2)], &|_| ()).findings;
+    assert_eq!(found.verdict, Verdict::Explained, "{}", found.sentence);
+    assert_eq!(found.causes[0].id, "l_wrong", "{}", found.sentence);
+    let value = found.causes[0].parameters["inductance"].value;
+    assert!((value / 21e-6 - 1.0).abs() < 0.01, "{value}");
+    let said: Vec<&String> = (found.noise.repairs.iter())
+        .filter(|said| said.contains("behind the edge"))
+        .collect();
+    // 149 even rows from 302 to 598, and 4 + 1 + 20
+    assert!(
+        said.len() == 2 && said[0].contains("149 of 600") && said[1].contains("25 of 600"),
+        "{:?}",
+        found.noise.repairs
+    );
+}

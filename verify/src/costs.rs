@@ -152,7 +152,8 @@ fn measured(costs: &Costs, policy: &Policy, target: &TargetSpec, clock: Option<f
             grouped(most)
         );
         if let Some(hz) = clock {
-            let share = |cycles: u64| 100.0 * cycles as f64 / hz / policy.sample_period;
+            // as the budget divides, for the same last digit
+            let share = |cycles: u64| 100.0 * (cycles as f64 / (hz * policy.sample_period));
             line += &format!(
                 ", {:.0} to {:.0} % of the control period at {}",
                 share(least),

@@ -139,8 +139,8 @@ pub(super) struct Logged<'a> {
 }
 
 impl<'a> Logged<'a> {
-    fn new(feature: &Feature, own: &[f64], values: &'a [f64], tolerance: f64) -> Self {
-        let allowed = allowed(feature, values, tolerance);
+    fn new(policy: &Policy, feature: &Feature, own: &[f64], values: &'a [f64], tolerance: f64) -> Self {
+        let allowed = allowed(policy, feature, values, tolerance);
         let [low, high] = ends(values);
         let at = |end: f64| values.iter().filter(|value| (*value - end).abs() <= allowed).count();
         // one row has to be the highest; several of exactly one value are held there, unless all are
@@ -247,8 +247,15 @@ pub(super) fn explain(
 ) -> Option<String> {
     let feature = policy.features.get(index)?;
     let own = course.features.get(index)?;
-    let logged = Logged::new(feature, &own.observation, values, tolerance);
+    let logged = Logged::new(policy, feature, &own.observation, values, tolerance);
     let trial = Trial::new(policy, feature, own, course, &logged);
+    // a tolerance below what is left of the digits: any relation with a free number would fit as well as the contract's own
+    if trial.fits(&trial.links) {
+        return Some(
+            "the contract's own formula fits the log: what differs are roundings, so the tolerance is too small"
+                .to_owned(),
+        );
+    }
     // only what remembers something begins in another way
     let duties = policy
         .paths()

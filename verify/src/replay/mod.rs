@@ -245,7 +245,7 @@ fn compared(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faults
             name: feature.name.clone(),
             own: ends(own),
             logged: logged.map(|logged| {
-                let mut compared = compare(own, logged, log, allowed(feature, logged, tolerance), &late);
+                let mut compared = compare(own, logged, log, allowed(policy, feature, logged, tolerance), &late);
                 if compared.first_line.is_some() {
                     let is_other =
                         |duties: &&DutyResult| duties.first_line.is_some() && (duties.adds || !duties.derived);

@@ -34,7 +34,8 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
     suitable_format: "i16",
     // the tables differ from core to core
     cycles: None,
-    most_per_cycle: None,
+    // single and dual issue are what there is of microcontrollers with these instructions: GD32VF103 and ESP32-C3 begin one, SweRV EH1 two
+    most_per_cycle: Some(2),
     sections: GNU_SECTIONS,
     clock_hz: Some(160_000_000),
     c_row_block: RowBlock::Rows(8),

@@ -161,6 +161,17 @@ fn a_processor_without_floats_is_sent_to_integers() {
 }
 
 #[test]
+fn a_core_that_cannot_begin_so_many_instructions_is_told_though_no_cycles_are_modelled() {
+    let desk = Desk::new("minimal");
+    let said = desk.succeed("compile policy --target riscv32imc --clock 1MHz --out out");
+    assert!(said.contains("control period NOT met"), "{said}");
+    assert!(said.contains("riscv32imc begins 2 a cycle at most"), "{said}");
+    // a thousand times the clock, and nobody knows but the board
+    let said = desk.succeed("compile policy --target riscv32imc --clock 1GHz --out fast");
+    assert!(said.contains("cannot be said"), "{said}");
+}
+
+#[test]
 fn a_target_without_a_model_says_so() {
     let desk = Desk::new("minimal");
     let said = desk.succeed("compile policy --clock 3GHz --out out");

@@ -142,7 +142,7 @@ fn a_missed_specification_is_exit_code_1_and_the_policy_is_there() {
     desk.write("train/train.toml", &format!("{SETTINGS}\n[[spec]]\ndeviation = 1e-6\n"));
     let ran = train(&desk, "--out out --seeds 3");
     assert_eq!(ran.code, Some(1), "{}{}", ran.stdout, ran.stderr);
-    let figure = ["The specification is missed: ", "deviation ", "limit 1 uV"];
+    let figure = ["The specification is missed: ", "deviation 13.", "limit 1.0000 µV"];
     for words in figure {
         assert!(ran.stdout.contains(words), "{words}: {}", ran.stdout);
     }

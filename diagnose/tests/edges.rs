@@ -259,7 +259,7 @@ fn rows_behind_the_edge_at_the_start_of_the_period_are_left_out() {
     ];
     // the trigger hesitates in every second row of the first record from its middle on, and in some rows of the second
     let is_late = |n: usize, row: usize| match n {
-        0 => row > 300 && row % 2 == 0,
+        0 => row > 300 && row.is_multiple_of(2),
         1 => matches!(row, 50..54 | 333 | 420..440),
         _ => false,
     };

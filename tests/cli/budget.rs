@@ -171,6 +171,53 @@ fn a_core_that_cannot_begin_so_many_instructions_is_told_though_no_cycles_are_mo
     assert!(said.contains("cannot be said"), "{said}");
 }
 
+/// Such cores begin one instruction a cycle: with which format, network or period that does is said, and a network that is named does.
+#[test]
+fn a_core_of_one_instruction_a_cycle_is_told_what_would_do() {
+    let desk = Desk::new("minimal");
+    let example = tests::example();
+    let at = |clock: &str| {
+        desk.succeed(&format!(
+            "compile {} --target riscv32imc --clock {clock} --out {clock}",
+            example.display()
+        ))
+    };
+    // floats of a library take some 80 instructions for each cycle, 16 bits some 2
+    let said = at("108MHz");
+    for word in [
+        "control period NOT met",
+        "in i16 (NOT met by a core that begins one)",
+        "next to it comes i16",
+        "one instruction a cycle fills a period of ",
+        "a Cortex-M4F, which has an FPU",
+    ] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+    let sizes = said.split("cut down to ").nth(1).unwrap_or_else(|| panic!("{said}"));
+    let width: usize = sizes.split(" -> ").nth(1).unwrap().parse().unwrap();
+    let policy = policy::load(&example).unwrap().with_format(policy::NumericFormat::I16);
+    let target = targets::find("riscv32imc").unwrap();
+    let instructions = |width: usize| {
+        let cut = policy.cut_to(width).unwrap();
+        let files = codegen::generate(&cut, target, &[codegen::Output::C], None)
+            .unwrap()
+            .files;
+        let costs = verify::costs::StepCosts::of(&cut, target, &[codegen::Language::C], &files);
+        costs.measured().map(|costs| costs.instructions_max).min().unwrap()
+    };
+    // 100 us at 108 MHz
+    assert!(
+        instructions(width) <= 10_800 && instructions(width + 4) > 10_800,
+        "{said}"
+    );
+    // where integers come down to one a cycle, they are the way, and no network is cut
+    let said = at("300MHz");
+    assert!(
+        said.contains("hint: --format i16 needs 0.") && !said.contains("cut down"),
+        "{said}"
+    );
+}
+
 #[test]
 fn a_target_without_a_model_says_so() {
     let desk = Desk::new("minimal");

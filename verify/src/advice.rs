@@ -1,10 +1,11 @@
 //! What is said about the budget of a control step, and what to do where it is not met.
 
+mod unmodelled;
+
 use codegen::output::languages;
 use codegen::{CodegenError, Output};
 use interp::decisions::{Decisions, decisions};
 use policy::{NumericFormat, Policy};
-use report::grouped;
 use targets::TargetSpec;
 
 use crate::budget::{Budget, Clock, Fit, Slot};
@@ -43,9 +44,9 @@ pub fn lines(
     )];
     lines.extend(budgets.iter().map(|(build, budget)| budget.text(build, clock.slot)));
     if budgets.is_empty() {
-        lines.push(match target.cycles {
-            None => unmodelled(policy, target, outputs, costs, clock)?,
-            Some(_) => "  cannot be said: no step ran under the target's emulator here".to_owned(),
+        lines.extend(match target.cycles {
+            None => unmodelled::lines(policy, target, outputs, costs, clock)?,
+            Some(_) => vec!["  cannot be said: no step ran under the target's emulator here".to_owned()],
         });
         return Ok(lines);
     }
@@ -118,17 +119,24 @@ fn whole_period(policy: &Policy, slot: Slot, own: &[Proposal], others: &[Proposa
     let chosen = surely.or_else(perhaps)?;
     let Proposal { format, build, .. } = chosen;
     let (fewest, most) = whole(chosen);
-    let and_there = match policy.observers.is_empty() {
-        true => "",
-        false => ", and compute_delay = 1 in each [[observer]]",
-    };
     Some(format!(
-        "  = hint: trained again with pwm.sampling_phase = 0 and pwm.duty_delay = 1 in the plant file{and_there}, a step has the whole period: \
-         {} with {build} takes {:.0} to {:.0} % of that",
+        "{}: {} with {build} takes {:.0} to {:.0} % of that",
+        trained_for_the_whole(policy),
         format.name(),
         100.0 * fewest,
         100.0 * most
     ))
+}
+
+/// How a policy that samples inside of its period gets the whole of it.
+fn trained_for_the_whole(policy: &Policy) -> String {
+    let and_there = match policy.observers.is_empty() {
+        true => "",
+        false => ", and compute_delay = 1 in each [[observer]]",
+    };
+    format!(
+        "  = hint: trained again with pwm.sampling_phase = 0 and pwm.duty_delay = 1 in the plant file{and_there}, a step has the whole period"
+    )
 }
 
 /// What would help where no format fits: another clock or period, a smaller network, another activation.
@@ -220,136 +228,6 @@ fn what_it_changes(policy: &Policy, format: NumericFormat) -> String {
 fn arrows(sizes: &[usize]) -> String {
     let texts: Vec<String> = sizes.iter().map(usize::to_string).collect();
     texts.join(" -> ")
-}
-
-/// A branch may be folded into the instructions beside it, so that a cycle ends more than begin in it: in the loops of a network less
-/// than a tenth of the instructions are branches.
-const FOLDED: f64 = 1.1;
-
-fn micros(seconds: f64) -> String {
-    format!("{:.1} us", 1e6 * seconds)
-}
-
-/// What is said where even the most instructions that a processor begins in a cycle are too few for a step in the policy's format.
-fn too_many(
-    policy: &Policy,
-    target: &'static TargetSpec,
-    outputs: &[Output],
-    costs: &StepCosts,
-    clock: Clock,
-) -> Result<Option<String>, CodegenError> {
-    let cycles = clock.hz * policy.sample_period * clock.slot.part();
-    let least = costs.measured().min_by_key(|costs| costs.instructions_max);
-    let (Some(most), Some(least)) = (target.most_per_cycle, least) else {
-        return Ok(None);
-    };
-    let allowed = FOLDED * f64::from(most);
-    let needed = least.instructions_max as f64 / cycles;
-    if needed <= allowed {
-        return Ok(None);
-    }
-    let mut others_need = Vec::new();
-    for format in others(policy, target) {
-        let policy = policy.clone().with_format(format);
-        let costs = in_format(&policy, target, outputs)?;
-        if let Some(instructions) = costs.measured().map(|costs| costs.instructions_max).min() {
-            let needed = instructions as f64 / cycles;
-            let verdict = match needed {
-                _ if needed > allowed => " (not met)",
-                _ if needed > f64::from(most) => " (hardly)",
-                _ => " (a cycle counter on the board decides)",
-            };
-            others_need.push(format!("{} needs {needed:.2}{verdict}", format.name()));
-        }
-    }
-    let others_need = match others_need.is_empty() {
-        true => String::new(),
-        false => format!("; with --format {}", others_need.join(", ")),
-    };
-    let shortest = micros(least.instructions_max as f64 / allowed / clock.hz);
-    let by_comparison = relative(policy, target, outputs, clock)?.unwrap_or_default();
-    Ok(Some(format!(
-        "  control period NOT met: {} instructions in the shortest build, {}, are {needed:.2} for each of {} cycles at {clock}, and {} begins \
-         {most} a cycle at most, branches apart: in less than {shortest} no step ends{others_need}{by_comparison}",
-        grouped(least.instructions_max),
-        least.build,
-        grouped(cycles as u64),
-        target.name
-    )))
-}
-
-/// What can be said without a model: how many cycles there are, and how many instructions, in the other formats as well.
-fn unmodelled(
-    policy: &Policy,
-    target: &'static TargetSpec,
-    outputs: &[Output],
-    costs: &StepCosts,
-    clock: Clock,
-) -> Result<String, CodegenError> {
-    let cycles = clock.hz * policy.sample_period * clock.slot.part();
-    let what = match clock.slot {
-        Slot::Behind(_) => "what is left of a control period behind the sample",
-        _ => "a control period",
-    };
-    if let Some(text) = too_many(policy, target, outputs, costs, clock)? {
-        return Ok(text);
-    }
-    let mut text = format!(
-        "  cannot be said: no cycles are modelled for {} (`policyc targets` says for which they are); {what} is {} cycles at {clock}",
-        target.name,
-        grouped(cycles as u64)
-    );
-    let least = costs.measured().min_by_key(|costs| costs.instructions_max);
-    let Some(costs) = least else { return Ok(text) };
-    let instructions = costs.instructions_max;
-    text += &format!(
-        ", and {} instructions in the shortest build, {}: it fits if the processor does {:.2} instructions a cycle or more, with its wait states",
-        grouped(instructions),
-        costs.build,
-        instructions as f64 / cycles
-    );
-    for format in others(policy, target) {
-        let policy = policy.clone().with_format(format);
-        let least = in_format(&policy, target, outputs)?;
-        let least = least.measured().map(|costs| costs.instructions_max).min();
-        if let Some(instructions) = least {
-            text += &format!("; {:.2} in {}", instructions as f64 / cycles, format.name());
-        }
-    }
-    if let Some(by_comparison) = relative(policy, target, outputs, clock)? {
-        text += &by_comparison;
-    }
-    Ok(text + ". A cycle counter on the board says the rest")
-}
-
-/// What a modelled processor of the same instructions makes of such code, for one who has to judge whether that is much.
-fn relative(
-    policy: &Policy,
-    target: &'static TargetSpec,
-    outputs: &[Output],
-    clock: Clock,
-) -> Result<Option<String>, CodegenError> {
-    let modelled = match target.name {
-        "cortex-m33" | "cortex-m7" => targets::find("cortex-m4f"),
-        _ => None,
-    };
-    let Some(modelled) = modelled else { return Ok(None) };
-    let costs = in_format(policy, modelled, outputs)?;
-    let cycles = costs
-        .measured()
-        .filter_map(|costs| Some((costs.instructions_max, costs.model_cycles?)));
-    let soonest = cycles.min_by_key(|(_, (_, most))| *most);
-    Ok(soonest.map(|(instructions, (least, most))| {
-        let a_cycle = |cycles: u64| instructions as f64 / cycles as f64;
-        format!(
-            ". By comparison: a Cortex-M4F, whose cycles are modelled, does {:.2} to {:.2} instructions a cycle in this code at 0 wait states, \
-             and takes {} to {} for a step at this clock",
-            a_cycle(most),
-            a_cycle(least),
-            micros(least as f64 / clock.hz),
-            micros(most as f64 / clock.hz)
-        )
-    }))
 }
 
 /// What a format takes in its fastest build.

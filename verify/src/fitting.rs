@@ -20,7 +20,7 @@ const STEP: usize = 4;
 pub struct Fitting {
     /// Inputs, then neurons of each layer.
     pub sizes: Vec<usize>,
-    /// Least and largest share of the control period that the model says.
+    /// Least and largest share of the control period that the model says; where there is none, what one instruction a cycle takes, twice.
     pub share: (f64, f64),
 }
 
@@ -90,12 +90,17 @@ impl Bench<'_> {
         self.share(&policy.activated_by(Activation::Relu)?)
     }
 
-    /// What a step takes; `None` where it cannot be built or does not run here.
+    /// What a step takes, as [`Fitting::share`]; `None` where it cannot be built or does not run here.
     fn share(&self, policy: &Policy) -> Option<(f64, f64)> {
         let cores: Vec<Output> = languages(self.outputs).iter().map(|language| language.core()).collect();
         let files = codegen::sources(policy, self.target, &cores, None).ok()?.files;
         let build = self.find(policy, &files)?;
         let costs = measure(policy, self.target, &files, &build).ok()?;
+        if self.target.cycles.is_none() {
+            let cycles = self.clock.hz * policy.sample_period * self.clock.slot.part();
+            let share = costs.instructions_max as f64 / cycles;
+            return Some((share, share));
+        }
         Budget::of(&costs, self.clock, policy.sample_period).map(|budget| budget.share)
     }
 

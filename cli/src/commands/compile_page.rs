@@ -155,7 +155,7 @@ fn layers(policy: &Policy) -> Section {
         .iter()
         .map(|layer| (layer.inputs * layer.outputs) as f64)
         .collect();
-    let svg = BarChart::new("Where the time goes", names)
+    let svg = BarChart::new("Products of the network", names)
         .panel(BarPanel::new(Axis::new("multiply-accumulates")).bars("", macs))
         .svg();
     Section::new("Layers").table(table).chart_or_reason(

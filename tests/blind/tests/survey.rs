@@ -289,12 +289,13 @@ fn faults_of_the_bench_are_named_within_seconds() {
 #[test]
 fn records_that_misled_once_have_their_answer() {
     // in the first two the current stops in every period, so that the initial one is forgotten; in the next two a sample at the very start
-    // of the period lies before the edge in one row and behind it in another
+    // of the period lies before the edge in one row and behind it in another; the last is drawn evenly
     let cases = [
         (Group::Good, 54),
         (Group::Good, 83),
         (Group::Good, 27),
         (Group::Good, 50),
+        (Group::Nonsense, 1),
     ];
     for (group, number) in cases {
         let found = survey(1_795_731_871_201_373_090, group, number..number + 1, (60.0, usize::MAX));

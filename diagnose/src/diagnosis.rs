@@ -30,7 +30,7 @@ use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 use crate::resistors;
 use crate::unseen;
 use crate::whiteness;
-use crate::words::{self, nearest, other_carrier as other_carrier_said, sentence, shifted};
+use crate::words::{self, MOST_OF_IT, nearest, other_carrier as other_carrier_said, sentence, shifted};
 use crate::work::Work;
 use crate::worth::{self, Worth};
 
@@ -123,8 +123,11 @@ pub fn diagnose_knowing(
     let more = standing.clone().into_iter().chain(work.said());
     let notes = answer.notes.into_iter().chain(unused).chain(more);
     let left = found.left();
+    // what the nearest causes leave is said with them
+    let is_said = !explained && found.attribution.removed(&found.problem) >= MOST_OF_IT && !found.structure.is_empty();
+    let said = if is_said { &[][..] } else { &left[..] };
     let findings = Findings {
-        sentence: sentence(&found, &answer.causes, set_aside.as_ref(), &left)
+        sentence: sentence(&found, &answer.causes, set_aside.as_ref(), said)
             + &answer.near
             + &compared.sentence()
             + &shifted(&answer.shifts),

@@ -37,7 +37,11 @@ fn is_cut_off([low, high]: [f64; 2], is_size: bool, value: f64) -> bool {
 fn tried(candidate: &Candidate, place: usize) -> Option<[f64; 2]> {
     let name = candidate.form.knobs.get(place)?.name;
     let is_round = candidate.form.search == Search::Line && name == "phase";
-    let [low, high, _] = *candidate.ranges.get(place)?;
+    let [low, mut high, _] = *candidate.ranges.get(place)?;
+    // a core that loses all of its inductance is that of a data sheet, not one that would lose more
+    if name == "saturation" {
+        high = 2.0;
+    }
     (candidate.form.is_smooth() && !is_round).then_some([low, high])
 }
 

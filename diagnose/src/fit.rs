@@ -15,6 +15,7 @@ use crate::drive::Model;
 use crate::normal::Normal;
 use crate::problem::{Problem, Starts, axpy, dot, nudged};
 use crate::search::sought;
+use crate::work::Work;
 
 /// A step that gains less than this ends the settling of initial states: a five-hundredth of what
 /// decides a tie (9).
@@ -343,6 +344,10 @@ impl Fitter<'_> {
                 moved[*n] = (values[*n] + step[k] * unit).clamp(low, high);
                 axpy(&mut left, -(moved[*n] - values[*n]) / unit, &round.jacobian.raw[k]);
                 self.set(&mut model, place, moved[*n]);
+            }
+            if !Work::may_simulate(&model, &self.problem.base) {
+                *damping *= 10.0;
+                continue;
             }
             let next = Moving::EACH.into_iter().find_map(|moving| {
                 let mut starts = state.starts.clone();

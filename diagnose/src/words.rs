@@ -78,6 +78,14 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>, left:
     }
 }
 
+/// Share of the error above the noise from which on what is said of the rest is that of the rest: swings behind steps that a cause almost
+/// takes away look like lost pulses or jitter without it.
+// the fifth verdict asks for as much
+pub const MOST_OF_IT: f64 = 0.9;
+
+/// Causes that are a curve of a part, of which the plant has one law.
+const CURVES: [&str; 2] = ["l_saturation", "c_derating"];
+
 /// What is left, channel by channel.
 fn shapes(structure: &[Structure]) -> String {
     let shape = |s: &Structure| format!("{} of {}: {}", s.channel, s.record, s.shape);
@@ -230,8 +238,13 @@ pub fn nearest(partial: &[Named], removed: f64, fits_training: bool, left: &[Str
             let rest = worst.map_or(String::new(), |one| {
                 format!(", which leaves {}", shapes(std::slice::from_ref(one)))
             });
+            let is_curve = removed >= MOST_OF_IT && matches!(partial, [only] if CURVES.contains(&only.id));
+            let but = match is_curve {
+                true => ", but a part whose curve is not one of the law's looks like this: check it first",
+                false => "",
+            };
             format!(
-                " Nearest comes {}{rest}. That takes away {:.0} % of the error above the noise: too little for an explanation.",
+                " Nearest comes {}{rest}. That takes away {:.0} % of the error above the noise: too little for an explanation{but}.",
                 list.join("; with "),
                 100.0 * removed
             )

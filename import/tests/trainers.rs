@@ -302,6 +302,33 @@ fn external_data_outside_the_folder_are_refused_unread() {
     assert!(refusal(&file).contains("external.onnx.data"));
 }
 
+/// Nodes need no names in ONNX, and some exporters give none.
+#[test]
+fn layers_of_nodes_without_a_name_are_called_by_their_weights() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut graph = std::fs::read(fixture("gemm.onnx")).unwrap();
+    let begin = b"/network/";
+    let named: Vec<usize> = (2..graph.len())
+        .filter(|at| graph[*at..].starts_with(begin) && graph[at - 2] == 0x1a)
+        .collect();
+    assert_eq!(named.len(), 5, "three layers and two activations");
+    for at in named {
+        // field 3 is the name, field 6 a remark
+        graph[at - 2] = 0x32;
+    }
+    let file = folder.path().join("nameless.onnx");
+    write(&file, &graph);
+    let new = import::new_policy(&file, &folder.path().join("policy.toml"), &Options::default()).unwrap();
+    let layers = "# layers, first to last: network.0.weight > network.2.weight > network.4.weight";
+    assert!(new.contract.contains(layers), "{}", new.contract);
+    // a fault names such a node, too
+    let at = graph.windows(6).position(|six| six == b"\"\x04Relu").unwrap();
+    graph[at + 2..at + 6].copy_from_slice(b"Mish");
+    write(&file, &graph);
+    let faults = refusal(&file);
+    assert!(faults.contains("Mish `/network/network.1/Relu_output_0`"), "{faults}");
+}
+
 /// Every prefix and every changed byte of an archive is read or refused, and soon.
 #[test]
 fn a_damaged_archive_is_refused() {

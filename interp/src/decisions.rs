@@ -130,7 +130,9 @@ impl Decisions {
             Decisions::Schedule(gains) => Some(gains.largest),
             Decisions::Choice(_) | Decisions::Several(_) => None,
         });
-        let error = error.reduce(f64::max).map(accepting_error);
+        let error = error
+            .reduce(f64::max)
+            .map(|largest| format!("golden_duty = {}", accepting(largest)));
         let entries: Vec<String> = share.into_iter().chain(error).collect();
         entries.join(" and ")
     }
@@ -154,10 +156,11 @@ impl Decisions {
     }
 }
 
-/// The entry that accepts an error of duties or gains, rounded up to two digits.
-fn accepting_error(largest: f64) -> String {
+/// The number that accepts an error of duties or gains, rounded up to two digits.
+#[must_use]
+pub fn accepting(largest: f64) -> String {
     let unit = 10_f64.powf(largest.log10().floor() - 1.0);
-    format!("golden_duty = {:.1e}", (largest / unit).ceil() * unit)
+    format!("{:.1e}", (largest / unit).ceil() * unit)
 }
 
 impl Choices {

@@ -34,6 +34,8 @@ pub struct WorstGain {
     pub observation: Vec<f32>,
     /// Which gain.
     pub gain: usize,
+    /// From its least to its largest value.
+    pub range: f64,
     /// Its value in the trainer's actor.
     pub expected: f64,
     /// Its value in the format.
@@ -66,6 +68,7 @@ pub(crate) fn gains(policy: &Policy, head: &Schedule) -> Option<Gains> {
             row,
             observation: golden.observations.chunks_exact(features).nth(row)?.to_vec(),
             gain,
+            range: head.gains.get(gain)?.span(),
             expected: *expected[row].get(gain)?,
             found: *found[row].get(gain)?,
         })
@@ -141,6 +144,7 @@ pub(crate) fn judge(golden: &Golden, head: &Schedule, answers: &[&[f64]]) -> Gol
         worst_relative_error: None,
         worst_duty_error: (!golden.law.is_empty()).then(of_duties),
         worst_gain_error: (!golden.q_values.is_empty()).then(of_gains),
+        limits_range: Some(head.limits.high - head.limits.low),
         output_error: None,
         activations: Vec::new(),
         tolerance: golden.tolerance,

@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::decisions::answers;
 pub use crate::refusal::refusal;
 pub use crate::several::OutputResult;
+pub use crate::unproven::unproven;
 use crate::{Controller, Real, argmax};
 use crate::{duties, gains, several};
 
@@ -29,6 +30,9 @@ pub struct GoldenResult {
     /// Largest |gain - golden gain| of a gain schedule as a share of that gain's range; `None` of any other head.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_gain_error: Option<f64>,
+    /// Of a gain schedule the range of the limits, of which the error of the duty is a share: no gain has this one.
+    #[serde(skip)]
+    pub limits_range: Option<f64>,
     /// Largest |duty - duty of the golden output| as that share: small where the network is right and only the way from its
     /// output to the duty is another.
     #[serde(skip)]
@@ -85,8 +89,12 @@ impl fmt::Display for GoldenResult {
             ));
         }
         if let Some(error) = self.worst_duty_error {
+            let range = self
+                .limits_range
+                .map(|range| format!("the range of the limits, {}", (1e6 * range).round() / 1e6));
+            let range = range.unwrap_or_else(|| "its range".to_owned());
             parts.push(format!(
-                "largest error of the duty {error:.1e} of its range (allowed {:.0e})",
+                "largest error of the duty {error:.1e} of {range} (allowed {:.0e})",
                 self.tolerance
             ));
         }
@@ -144,6 +152,7 @@ fn judge_duties(golden: &Golden, head: &policy::Continuous, answers: &[&[f64]]) 
         worst_relative_error: None,
         worst_duty_error: duties::given(head, golden).map(|expected| worst(&expected)),
         worst_gain_error: None,
+        limits_range: None,
         output_error: (!from_outputs.is_empty()).then(|| worst(&from_outputs)),
         activations: Vec::new(),
         tolerance: golden.tolerance,
@@ -175,6 +184,7 @@ fn judge_choices(golden: &Golden, answers: &[&[f64]]) -> GoldenResult {
         worst_relative_error: (!golden.q_values.is_empty()).then_some(worst),
         worst_duty_error: None,
         worst_gain_error: None,
+        limits_range: None,
         output_error: None,
         activations: Vec::new(),
         tolerance: golden.tolerance,
@@ -325,10 +335,6 @@ impl GoldenResult {
     }
 }
 
-/// What is open without golden vectors.
-pub const UNPROVEN: &str = "no golden vectors: nothing shows that the weights were read as the trainer meant; answers of the trainer do, \
-                             or of its log (`policyc replay --golden`)";
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -362,6 +368,7 @@ mod tests {
             worst_relative_error: Some(error),
             worst_duty_error: None,
             worst_gain_error: None,
+            limits_range: None,
             output_error: None,
             activations: Vec::new(),
             tolerance,
@@ -371,6 +378,7 @@ mod tests {
         assert_eq!(result(2e-5, 1e-5, 2).hint(), ROUNDED);
         assert_eq!(result(2e-5, 1e-5, 1).hint(), MISREAD, "another decision");
         assert_eq!(result(0.5, 0.1, 2).hint(), MISREAD, "half of the largest Q value");
+        assert_eq!(result(ROUNDING, 1e-9, 2).hint(), ROUNDED, "the end belongs to it");
     }
 
     #[test]

@@ -51,6 +51,7 @@ mod sound;
 pub mod state;
 pub mod status;
 mod trace;
+mod unproven;
 
 pub use activation::activate;
 pub use controller::Controller;

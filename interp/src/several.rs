@@ -56,6 +56,7 @@ pub(crate) fn judge(golden: &Golden, outputs: &[Output], answers: &[&[f64]]) -> 
         worst_relative_error: largest(|own| own.worst_relative_error),
         worst_duty_error: largest(|own| own.worst_duty_error),
         worst_gain_error: None,
+        limits_range: None,
         output_error: None,
         activations: Vec::new(),
         tolerance: golden.tolerance,

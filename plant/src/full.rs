@@ -24,6 +24,8 @@ pub(crate) mod lanes;
 use serde::{Deserialize, Serialize};
 
 use self::few::Few;
+use crate::catalogue;
+use crate::entry::Way;
 use crate::lag;
 use crate::parameters::Parameters;
 use crate::plain::Track;
@@ -108,6 +110,25 @@ struct Algebra<const N: usize> {
     slopes: [f64; N],
 }
 
+/// Whether a matrix takes the circuit over a step, of `rate` steps a second without it.
+fn is_affine(p: &Parameters, rate: f64) -> bool {
+    let is_fast = p.cable.inductance > 0.0 || has_c_in(p) && rate * p.t_sw() > MANY_STEPS;
+    let is_linear = p.inductor.saturation == 0.0 && p.capacitor.derating == 0.0;
+    is_fast && is_linear && p.source.ripple == 0.0
+}
+
+/// Steps of the integrator in a switching period without a load: what its simulation takes time for. 0 where a matrix stands for all of
+/// them, or the circuit is simple enough to need none.
+#[must_use]
+pub fn steps_per_period(p: &Parameters) -> f64 {
+    let rate = rate::fastest(p).1;
+    if catalogue::way(p) < Way::Full || is_affine(p, rate) {
+        0.0
+    } else {
+        rate * p.t_sw()
+    }
+}
+
 impl Full {
     pub fn new(p: &Parameters) -> Self {
         let sensors = &p.sensors;
@@ -118,8 +139,6 @@ impl Full {
         ];
         let (has_cable, has_lag) = (p.cable.inductance > 0.0, p.load.cpl_time_constant > 0.0);
         let rate = rate::fastest(p).1;
-        let is_fast = has_cable || has_c_in(p) && rate * p.t_sw() > MANY_STEPS;
-        let is_affine = is_fast && linear.iter().all(Option::is_some) && p.source.ripple == 0.0;
         Full {
             p: p.clone(),
             linear,
@@ -131,7 +150,7 @@ impl Full {
             low_pass,
             rate,
             total: rate::total(p),
-            is_affine,
+            is_affine: is_affine(p, rate),
         }
     }
 

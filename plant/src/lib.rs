@@ -45,6 +45,7 @@ pub use batch::Batch;
 pub use catalogue::{effects, parameter, parameters};
 pub use check::{check, check_load};
 pub use entry::{Effect, Parameter, Way};
+pub use full::steps_per_period;
 pub use parameters::{
     Cable, Capacitor, Carrier, Converter, Empirical, Inductor, LoadBox, Model, Parameters, Pwm, Rectifier, Sensor,
     Sensors, ShortPulse, Source, Switch, Topology,

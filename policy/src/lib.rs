@@ -46,7 +46,7 @@ pub use model::*;
 pub use raw::{RawPolicy, ReadOptions, read};
 pub use scaffold::{Draft, DraftFeature, DraftOutput, draft, new_contract, seen_from};
 pub use toml_input::{Fault, Place};
-pub use weights::{NamedTensor, OutputShape, chains, golden_file, golden_fits, named_tensors};
+pub use weights::{NamedTensor, OutputShape, chains, golden_file, golden_fits, law_told, named_tensors};
 
 /// Reads and checks the contract at `path`.
 ///

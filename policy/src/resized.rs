@@ -34,6 +34,24 @@ impl Policy {
         }))
     }
 
+    /// The policy without its last hidden layer; as [`Policy::cut_to`]. `None` where it has no more than one.
+    #[must_use]
+    pub fn without_a_hidden_layer(&self) -> Option<Policy> {
+        let [rest @ .., before, _, last] = self.layers.as_slice() else {
+            return None;
+        };
+        let rows = last.weights.chunks_exact(last.inputs.max(1));
+        let last = Layer {
+            inputs: before.outputs,
+            // only their number counts
+            weights: rows
+                .flat_map(|row| row.iter().copied().cycle().take(before.outputs))
+                .collect(),
+            ..last.clone()
+        };
+        self.with_layers(rest.iter().chain([before, &last]).cloned())
+    }
+
     /// The policy with another activation behind every hidden layer; as [`Policy::cut_to`].
     #[must_use]
     pub fn activated_by(&self, activation: Activation) -> Option<Policy> {

@@ -59,6 +59,12 @@ fn a_mapping_that_does_not_rise_is_refused() {
         "c = 0.0\nr = ¦-0.1",
         &["does not rise with d_sim", "at i_out = 12", "a + r i > 0"],
     );
+    // flat is not rising
+    mapping_fault(
+        "c = 0.0\n\n[valid]\ni_out = [0.0, 12.0]",
+        "c = 0.0\nr = ¦-0.0625\n\n[valid]\ni_out = [0.0, 16.0]",
+        &["does not rise with d_sim", "at i_out = 16", "a + r i > 0"],
+    );
     let policy = Folder::new()
         .file("drm.toml", MAPPING.replace("c = 0.0", "c = 0.0\nr = -0.01").as_bytes())
         .policy();

@@ -41,4 +41,38 @@ fn a_network_that_is_cut_keeps_its_inputs_and_its_outputs() {
         .flat_map(|row| row[..2].to_vec())
         .collect();
     assert_eq!((&after.weights, &after.bias), (&first_two, &before.bias));
+    // no layer is without neurons
+    let one = policy.cut_to(0).unwrap();
+    assert_eq!(one.layers.iter().map(|layer| layer.outputs).collect::<Vec<_>>(), [1, 3]);
+}
+
+#[test]
+fn a_hidden_layer_is_left_out_where_there_are_two() {
+    let policy = Folder::new().policy();
+    assert_eq!(policy.without_a_hidden_layer(), None, "it has one alone");
+    let mut deeper = policy.clone();
+    let [first, last] = policy.layers.as_slice() else {
+        panic!("two layers");
+    };
+    let middle = policy::model::Layer {
+        inputs: 4,
+        outputs: 3,
+        weights: vec![0.5; 12],
+        bias: vec![0.1; 3],
+        ..first.clone()
+    };
+    let narrow = policy::model::Layer {
+        inputs: 3,
+        weights: vec![0.25; 9],
+        ..last.clone()
+    };
+    deeper.layers = vec![first.clone(), middle, narrow];
+    let shallow = deeper.without_a_hidden_layer().unwrap();
+    let shapes: Vec<_> = shallow
+        .layers
+        .iter()
+        .map(|layer| (layer.inputs, layer.outputs))
+        .collect();
+    assert_eq!(shapes, [(2, 4), (4, 3)]);
+    assert_eq!(shallow.layers[1].weights, [0.25; 12]);
 }

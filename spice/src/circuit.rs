@@ -164,9 +164,11 @@ fn inductor(n: &mut String, p: &Parameters, i_l: f64) {
     if i.saturation > 0.0 {
         let x = format!("(V(fl)/{})", i.i_sat);
         let (whole, rest) = (i.steepness.floor(), i.steepness.fract());
-        let y = match i.steepness == 1.0 {
-            true => format!("{x}*{x}"),
-            false => format!("(({x}*{x})^{whole}*(1+{rest}*({x}*{x}-1)))"),
+        let y = match i.steepness {
+            1.0 => format!("{x}*{x}"),
+            // the power itself: the plant's line between quarters of the exponent is within a hundredth of it
+            s if s < 1.0 => format!("abs({x})^{:e}", 2.0 * s),
+            _ => format!("(({x}*{x})^{whole}*(1+{rest}*({x}*{x}-1)))"),
         };
         let value = format!("{l:e}*(1-{}*{y}/(1+{y}))", i.saturation);
         let _ = writeln!(

@@ -123,14 +123,7 @@ fn a_network_that_fits_is_named() {
     let sizes: Vec<usize> = sizes.split(" -> ").map(|size| size.parse().unwrap()).collect();
     assert_eq!((sizes[0], sizes[3]), (6, 12), "{line}");
     assert!(sizes[1] == sizes[2] && (4..64).contains(&sizes[1]), "{line}");
-    let nearest = said.lines().find(|line| line.contains("next to it comes")).unwrap();
-    let format = nearest
-        .split("next to it comes ")
-        .nth(1)
-        .unwrap()
-        .split(' ')
-        .next()
-        .unwrap();
+    let format = line.split(" % in ").nth(1).unwrap().split(' ').next().unwrap();
     let policy = policy::load(&example).unwrap();
     let fits = |width: usize| {
         let cut = policy
@@ -148,6 +141,83 @@ fn a_network_that_fits_is_named() {
         costs.measured().any(|costs| fit(costs) == verify::budget::Fit::Met)
     };
     assert!(fits(sizes[1]) && !fits(sizes[1] + 4), "{line}");
+}
+
+/// A law on three delayed errors, current and voltage, every 8.33 us: scaling between layers costs integers what they save in them.
+const FAST_LAW: &str = r#"
+name = "fast_law"
+sample_period = 8.333333333333333e-6
+signal = [
+  { name = "v_in", unit = "V", range = [0.0, 20.0] },
+  { name = "v_out", unit = "V", range = [0.0, 40.0] },
+  { name = "i_l", unit = "A", range = [-5.0, 20.0] },
+]
+feature = [
+  { name = "e", source = "24 - v_out", clip = [-4.0, 4.0] },
+  { name = "e_1", source = "24 - v_out", filters = [{ delay = 1 }], clip = [-4.0, 4.0] },
+  { name = "e_2", source = "24 - v_out", filters = [{ delay = 2 }], clip = [-4.0, 4.0] },
+  { name = "i", source = "i_l", scale = 0.25, offset = -1.0, clip = [-4.0, 4.0] },
+  { name = "vin", source = "v_in", scale = 0.5, offset = -6.0, clip = [-4.0, 4.0] },
+  { name = "d", source = "previous_duty", scale = 5.0, offset = -2.5, clip = [-4.0, 4.0] },
+]
+
+[network]
+weights = "weights.safetensors"
+hidden_activation = "relu"
+
+[actions]
+base = "previous_duty"
+gains = [{ squash = "tanh", scale = 0.03 }]
+
+[limits]
+duty = [0.1, 0.8]
+initial_duty = 0.5
+
+[fallback]
+duty = 0.1
+hold = 3
+"#;
+
+/// On a core with an FPU the smallest networks are faster in f32 than in i16: that format is tried too, and a hidden layer fewer before
+/// another processor is asked for.
+#[test]
+fn a_network_is_cut_down_in_every_format_of_the_core() {
+    let desk = Desk::new("minimal");
+    std::fs::create_dir(desk.path("law")).unwrap();
+    desk.write("law/policy.toml", FAST_LAW);
+    let recipe = tests::fixture::Recipe {
+        seed: 3,
+        widths: vec![6, 8, 8, 1],
+        biases: 0.25,
+    };
+    std::fs::write(desk.path("law/weights.safetensors"), recipe.network().unwrap()).unwrap();
+    let at = |clock: &str| {
+        desk.succeed(&format!(
+            "compile law --target cortex-m4f --clock {clock} --out {clock}"
+        ))
+    };
+    let said = at("170MHz");
+    assert!(said.contains("next to it comes i16"), "{said}");
+    let line = said
+        .lines()
+        .find(|line| line.contains("cut down to"))
+        .unwrap_or_else(|| panic!("{said}"));
+    assert!(
+        line.contains("6 -> 4 -> 4 -> 1 takes ") && line.contains(" % in f32 with "),
+        "{line}"
+    );
+    let said = at("155MHz");
+    let sizes = said.split("cut down to ").nth(1).unwrap_or_else(|| panic!("{said}"));
+    let sizes: Vec<&str> = sizes.split(" takes").next().unwrap().split(" -> ").collect();
+    assert!(matches!(sizes[..], ["6", _, "1"]), "{said}");
+    let said = at("60MHz");
+    for word in [
+        "not even four neurons",
+        "tried in f32 and i16: 6 -> 4 -> 1 takes ",
+        "another processor",
+    ] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
 }
 
 #[test]

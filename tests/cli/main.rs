@@ -26,6 +26,7 @@ mod replayed_clips;
 mod replayed_duties;
 mod replayed_filters;
 mod replayed_formats;
+mod replayed_gains;
 mod several;
 mod shell;
 mod simulate;

@@ -8,9 +8,9 @@ use interp::decisions::{Decisions, decisions};
 use policy::{NumericFormat, Policy};
 use targets::TargetSpec;
 
-use crate::budget::{Budget, Clock, Fit, Slot};
+use crate::budget::{Budget, Clock, Fit, Slot, percents};
 use crate::costs::StepCosts;
-use crate::fitting::{Bench, Fitting, Widest};
+use crate::fitting::{Bench, Candidate, Fitting, Widest};
 use crate::lateness;
 use crate::measure::Costs;
 
@@ -57,36 +57,30 @@ pub fn lines(
     if budgets.iter().any(|(_, budget)| budget.fit == Fit::Met) {
         return Ok(lines);
     }
-    let own: Vec<Proposal> = budgets
-        .iter()
-        .map(|(build, budget)| Proposal {
-            format: policy.numeric_format,
-            build: (*build).to_owned(),
-            share: budget.share,
-        })
-        .collect();
+    let own = Proposal::of(policy, costs, clock);
     let others = proposals(policy, target, outputs, clock)?;
     let fits = others.iter().find(|proposal| proposal.share.1 <= 1.0);
-    let nearest = || {
-        let all = own.iter().chain(&others);
-        all.min_by(|a, b| a.share.1.total_cmp(&b.share.1)).cloned()
-    };
-    let whole = whole_period(policy, clock.slot, &own, &others);
+    let all: Vec<&Proposal> = own.iter().chain(&others).collect();
+    let nearest = || all.iter().min_by(|a, b| a.share.1.total_cmp(&b.share.1)).copied();
+    let whole = whole_period(policy, clock.slot, &all);
     // training again is worth more than another processor, and less than another format
     let (before, behind) = match fits {
         Some(_) => (None, whole),
         None => (whole, None),
     };
     lines.extend(before);
-    match fits.cloned().or_else(nearest) {
-        Some(Proposal { format, build, share }) if share.1 <= 1.0 => lines.push(format!(
-            "  = hint: --format {} takes {:.0} to {:.0} % with {build}{}",
-            format.name(),
-            100.0 * share.0,
-            100.0 * share.1,
-            what_it_changes(policy, format)
+    match fits.or_else(nearest) {
+        Some(fitting) if fitting.share.1 <= 1.0 => lines.push(format!(
+            "  = hint: --format {} takes {} % with {}{}",
+            fitting.format.name(),
+            percents(fitting.share),
+            fitting.build(),
+            what_it_changes(policy, fitting.format)
         )),
-        Some(nearest) => lines.extend(too_slow(policy, target, outputs, clock, &nearest)),
+        Some(nearest) => {
+            let bench = Bench { target, outputs, clock };
+            lines.extend(too_slow(policy, bench, nearest, &all));
+        }
         None => lines.push(
             "  = hint: no numeric format fits: a faster clock, a longer period or a smaller network is needed"
                 .to_owned(),
@@ -109,22 +103,18 @@ fn in_short(found: &[Fit]) -> String {
 
 /// What a policy that samples inside of its period takes of the whole one, which it has if it is trained so: of the most exact format that
 /// fits then, else of one that may; `None` where none does.
-fn whole_period(policy: &Policy, slot: Slot, own: &[Proposal], others: &[Proposal]) -> Option<String> {
+fn whole_period(policy: &Policy, slot: Slot, all: &[&Proposal]) -> Option<String> {
     let Slot::Behind(part) = slot else { return None };
     let whole = |proposal: &Proposal| (part * proposal.share.0, part * proposal.share.1);
-    let least = own.iter().min_by(|a, b| a.share.1.total_cmp(&b.share.1));
-    let ranked: Vec<&Proposal> = least.into_iter().chain(others).collect();
-    let surely = ranked.iter().find(|proposal| whole(proposal).1 <= 1.0);
-    let perhaps = || ranked.iter().find(|proposal| whole(proposal).0 <= 1.0);
+    let surely = all.iter().find(|proposal| whole(proposal).1 <= 1.0);
+    let perhaps = || all.iter().find(|proposal| whole(proposal).0 <= 1.0);
     let chosen = surely.or_else(perhaps)?;
-    let Proposal { format, build, .. } = chosen;
-    let (fewest, most) = whole(chosen);
     Some(format!(
-        "{}: {} with {build} takes {:.0} to {:.0} % of that",
+        "{}: {} with {} takes {} % of that",
         trained_for_the_whole(policy),
-        format.name(),
-        100.0 * fewest,
-        100.0 * most
+        chosen.format.name(),
+        chosen.build(),
+        percents(whole(chosen))
     ))
 }
 
@@ -140,57 +130,58 @@ fn trained_for_the_whole(policy: &Policy) -> String {
 }
 
 /// What would help where no format fits: another clock or period, a smaller network, another activation.
-fn too_slow(
-    policy: &Policy,
-    target: &'static TargetSpec,
-    outputs: &[Output],
-    clock: Clock,
-    nearest: &Proposal,
-) -> Vec<String> {
-    let Proposal { format, build, share } = nearest;
+fn too_slow(policy: &Policy, bench: Bench<'_>, nearest: &Proposal, all: &[&Proposal]) -> Vec<String> {
+    let Proposal { format, share, .. } = nearest;
+    let build = nearest.build();
     let mut lines = vec![format!(
-        "  = hint: no numeric format {}; next to it comes {} with {build}, {:.0} to {:.0} %: it fills a period of {:.0} us, or the \
+        "  = hint: no numeric format {}; next to it comes {} with {build}, {} %: it fills a period of {:.0} us, or the \
          present one at {:.0} MHz{}",
         if share.0 <= 1.0 { "surely fits" } else { "fits" },
         format.name(),
-        100.0 * share.0,
-        100.0 * share.1,
+        percents(*share),
         (1e6 * policy.sample_period * share.1).ceil(),
-        (1e-6 * clock.hz * share.1).ceil(),
+        (1e-6 * bench.clock.hz * share.1).ceil(),
         what_it_changes(policy, *format)
     )];
-    let bench = Bench {
-        target,
-        outputs,
-        build,
-        clock,
-    };
-    let policy = policy.clone().with_format(*format);
-    if let Some(share) = bench.with_relu(&policy) {
+    if let Some(share) = bench.with_relu(&policy.clone().with_format(*format), build) {
         lines.push(format!(
-            "  = hint: trained with relu the same network takes {:.0} to {:.0} % in {} with {build}",
-            100.0 * share.0,
-            100.0 * share.1,
+            "  = hint: trained with relu the same network takes {} % in {} with {build}",
+            percents(share),
             format.name()
         ));
     }
-    match bench.widest(&policy) {
-        Widest::Fits(Fitting { sizes, share }) => lines.push(format!(
-            "  = hint: this network cut down to {} takes {:.0} to {:.0} % in {} with {build}: train one of that size; interrupt entry and \
+    let candidates: Vec<Candidate> = all.iter().map(|proposal| proposal.candidate()).collect();
+    match bench.widest(policy, &candidates) {
+        Widest::Fits(Fitting {
+            sizes,
+            format,
+            build,
+            share,
+        }) => lines.push(format!(
+            "  = hint: this network cut down to {} takes {} % in {} with {build}: train one of that size; interrupt entry and \
              drivers come on top",
             arrows(&sizes),
-            100.0 * share.0,
-            100.0 * share.1,
+            percents(share),
             format.name()
         )),
-        Widest::None => lines.push(format!(
-            "  = hint: in {} with {build} not even four neurons in each hidden layer surely fit: a faster clock, a longer period or another \
-             processor is needed",
-            format.name()
+        Widest::None(smallest, formats) => lines.push(format!(
+            "  = hint: not even four neurons in each hidden layer surely fit and leave room for interrupt entry, tried in {}: {} takes \
+             {} % in {} with {}; a faster clock, a longer period or another processor is needed",
+            tried(&formats),
+            arrows(&smallest.sizes),
+            percents(smallest.share),
+            smallest.format.name(),
+            smallest.build
         )),
         Widest::Unknown => {}
     }
     lines
+}
+
+/// `f32 and i16`
+fn tried(formats: &[NumericFormat]) -> String {
+    let names: Vec<&str> = formats.iter().map(|format| format.name()).collect();
+    names.join(" and ")
 }
 
 /// What an integer format does to the decisions, in the same breath: one that is too coarse for the policy is refused.
@@ -234,8 +225,37 @@ fn arrows(sizes: &[usize]) -> String {
 #[derive(Debug, Clone)]
 struct Proposal {
     format: NumericFormat,
-    build: String,
+    /// The fastest first.
+    builds: Vec<String>,
     share: (f64, f64),
+}
+
+impl Proposal {
+    /// That of the policy's format; `None` where no build was counted.
+    fn of(policy: &Policy, costs: &StepCosts, clock: Clock) -> Option<Self> {
+        let budgets = costs
+            .measured()
+            .filter_map(|costs| Some((costs, Budget::of(costs, clock, policy.sample_period)?)));
+        let mut ranked: Vec<(&Costs, Budget)> = budgets.collect();
+        ranked.sort_by(|(_, a), (_, b)| a.share.1.total_cmp(&b.share.1));
+        Some(Self {
+            format: policy.numeric_format,
+            share: ranked.first()?.1.share,
+            builds: ranked.iter().map(|(costs, _)| costs.build.clone()).collect(),
+        })
+    }
+
+    fn build(&self) -> &str {
+        self.builds.first().map_or("", String::as_str)
+    }
+
+    fn candidate(&self) -> Candidate {
+        Candidate {
+            format: self.format,
+            builds: self.builds.clone(),
+            takes: self.share.1,
+        }
+    }
 }
 
 /// What may be proposed, the most exact first; the cycle models do not know fused operations.
@@ -257,17 +277,12 @@ fn proposals(
     let mut found = Vec::new();
     for format in others(policy, target) {
         let policy = policy.clone().with_format(format);
-        let measured = in_format(&policy, target, outputs)?;
-        let budgets = measured
-            .measured()
-            .filter_map(|costs| Some((costs, Budget::of(costs, clock, policy.sample_period)?)));
-        let best = budgets.min_by(|(_, a), (_, b)| a.share.1.total_cmp(&b.share.1));
-        if let Some((Costs { build, .. }, Budget { share, fit, .. })) = best {
-            let build = build.clone();
-            found.push(Proposal { format, build, share });
-            if fit == Fit::Met {
-                break;
-            }
+        let costs = in_format(&policy, target, outputs)?;
+        let proposal = Proposal::of(&policy, &costs, clock);
+        let is_met = proposal.as_ref().is_some_and(|proposal| proposal.share.1 <= 1.0);
+        found.extend(proposal);
+        if is_met {
+            break;
         }
     }
     Ok(found)

@@ -112,7 +112,23 @@ pub(crate) const HALF: f64 = 0.5;
 
 /// Share of the period below which what is left is none: interrupt entry and exit, two conversions and a timer take some 100 cycles,
 /// 1 % of a period of 100 us at 100 MHz.
-const SCARCE: f64 = 0.01;
+pub(crate) const SCARCE: f64 = 0.01;
+
+/// A share in percent, as `72`. Next to 100 with a decimal that is rounded away from it, so that what is read is what is judged.
+pub(crate) fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    match share {
+        _ if (share - 1.0).abs() >= SCARCE => format!("{percent:.0}"),
+        share if share > 1.0 => format!("{:.1}", (10.0 * percent).ceil() / 10.0),
+        share if share < 1.0 => format!("{:.1}", (10.0 * percent).floor() / 10.0),
+        _ => "100".to_owned(),
+    }
+}
+
+/// Least and most: `72 to 102`.
+pub(crate) fn percents((least, most): (f64, f64)) -> String {
+    format!("{} to {}", percent(least), percent(most))
+}
 
 /// Whether the model says that a step fits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -180,7 +196,7 @@ impl Budget {
     /// One line for the build of this name.
     #[must_use]
     pub fn text(&self, build: &str, slot: Slot) -> String {
-        let (least, most) = (100.0 * self.share.0, 100.0 * self.share.1);
+        let most = 100.0 * self.share.1;
         let period = grouped(self.period_cycles as u64);
         let clock = Clock::shown(self.clock_hz);
         let is_whole = is_whole(&self.part);
@@ -221,7 +237,8 @@ impl Budget {
             Fit::Missed => "NOT met".to_owned(),
         };
         format!(
-            "  {build}: {what} {verdict}; {least:.0} to {most:.0} % of {period} cycles at {clock} (model at 0 wait states, never measured)"
+            "  {build}: {what} {verdict}; {} % of {period} cycles at {clock} (model at 0 wait states, never measured)",
+            percents(self.share)
         )
     }
 }
@@ -303,6 +320,10 @@ mod tests {
                 .text("gcc", Slot::Unknown)
         };
         assert!(text((5_000, 9_950)).contains("nothing left"));
+        // of what is judged as another thing another figure is read
+        assert!(text((5_000, 9_999)).contains("50 to 99.9 %"));
+        assert!(text((5_000, 10_000)).contains("50 to 100 %"));
+        assert!(text((5_000, 10_001)).contains("50 to 100.1 %"));
         assert!(text((5_000, 9_800)).contains("met, half of it in doubt; 2 % of the period is left"));
         assert!(text((5_100, 9_800)).contains("met, half of it NOT; 2 % of the period is left"));
         assert!(text((2_000, 5_000)).contains("met, and so is half of it; 50 % of the period is left"));

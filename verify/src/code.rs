@@ -5,7 +5,7 @@ use std::path::Path;
 use codegen::output::with_cores;
 use codegen::{Output, manifest};
 use interp::decisions::{Decisions, decisions};
-use interp::golden::{UNPROVEN, golden_result};
+use interp::golden::{golden_result, unproven};
 use policy::Policy;
 use targets::TargetSpec;
 use toml_input::{Faults, Message};
@@ -61,8 +61,8 @@ pub fn notes<'f>(
     sizes: &manifest::Sizes,
     files: impl Iterator<Item = &'f Path>,
 ) -> Vec<String> {
-    let unproven = policy.golden.is_none().then(|| UNPROVEN.to_owned());
-    let of_policy = policy.notes.iter().cloned().chain(unproven);
+    let open = policy.golden.is_none().then(|| unproven(policy));
+    let of_policy = policy.notes.iter().cloned().chain(open);
     of_policy.chain(codegen::notes(policy, target, sizes, files)).collect()
 }
 

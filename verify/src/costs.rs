@@ -6,7 +6,7 @@ use report::{bytes, grouped};
 use serde::Serialize;
 use targets::TargetSpec;
 
-use crate::budget::{Budget, Clock};
+use crate::budget::{Budget, Clock, percents};
 use crate::estimate::Estimate;
 use crate::measure::{Costs, usual_builds};
 use crate::session::Files;
@@ -153,11 +153,10 @@ fn measured(costs: &Costs, policy: &Policy, target: &TargetSpec, clock: Option<f
         );
         if let Some(hz) = clock {
             // as the budget divides, for the same last digit
-            let share = |cycles: u64| 100.0 * (cycles as f64 / (hz * policy.sample_period));
+            let share = |cycles: u64| cycles as f64 / (hz * policy.sample_period);
             line += &format!(
-                ", {:.0} to {:.0} % of the control period at {}",
-                share(least),
-                share(most),
+                ", {} % of the control period at {}",
+                percents((share(least), share(most))),
                 Clock::shown(hz)
             );
         }

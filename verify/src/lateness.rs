@@ -2,14 +2,14 @@
 
 use policy::Observer;
 
-use crate::budget::{Budget, Fit, HALF, Slot};
+use crate::budget::{Budget, Fit, HALF, Slot, percent};
 
 /// What is said of it: one line, `None` where a step fits into half of the period and nothing contradicts the training.
 #[must_use]
 pub fn note(budget: &Budget, slot: Slot, observers: &[Observer]) -> Option<String> {
     let all_count_on_it = !observers.is_empty() && observers.iter().all(|observer| observer.compute_delay == 1);
     let most = budget.share.1;
-    let takes = format!("  note: a step takes up to {:.0} % of the period", 100.0 * most);
+    let takes = format!("  note: a step takes up to {} % of the period", percent(most));
     match slot {
         // what fits behind the sample acts from the next start on, as the training had it
         Slot::Behind(_) => None,

@@ -60,7 +60,7 @@ mod zip;
 pub use drift::{drift, read_text};
 pub use folder::Folder;
 pub use interp::decisions::{Decisions, decisions};
-pub use interp::golden::{UNPROVEN, golden_result};
+pub use interp::golden::{golden_result, unproven};
 pub use live::{Live, LiveCommand};
 pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};
 pub use session::{Files, Options, Progress, VerifyError, run};

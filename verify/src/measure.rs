@@ -307,19 +307,26 @@ pub fn usual_builds(
     let usual = toolchain::builds(target, &[], &[]).into_iter().filter(|build| {
         languages.contains(&build.language()) && (Some(build.compiler) == first || build.compiler == toolchain::RUSTC)
     });
-    for build in usual {
-        match measure(policy, target, files, &build) {
-            Ok(costs) => {
-                usual_builds.measured.push(costs);
-                if let Some(build) = build.with_assembly(policy, target, files) {
-                    usual_builds.measured.push(measure(policy, target, files, &build)?);
-                }
-            }
+    let usual: Vec<Build> = usual.collect();
+    // side by side: a compiler and an emulator use one processor each
+    let each: Vec<Measured> = std::thread::scope(|scope| {
+        let started: Vec<_> = usual
+            .iter()
+            .map(|build| scope.spawn(move || with_assembly(policy, target, files, build)))
+            .collect();
+        let ended = started.into_iter().map(|one| one.join());
+        ended
+            .map(|one| one.unwrap_or_else(|_| Err(MeasureError::Run("the measurement broke off".to_owned()))))
+            .collect()
+    });
+    for (build, costs) in usual.iter().zip(each) {
+        match costs {
+            Ok(costs) => usual_builds.measured.extend(costs),
             Err(MeasureError::Missing(what)) => {
                 let compiles = toolchain::find(build.compiler).is_some() && build.language() == codegen::Language::C;
                 // only where nothing can run: a stack that is summed must not stand in for one that is measured
                 if compiles && toolchain::find(board.emulator).is_none() {
-                    usual_builds.estimated.push(estimate(policy, target, files, &build)?);
+                    usual_builds.estimated.push(estimate(policy, target, files, build)?);
                 }
                 usual_builds.missing.extend(what);
             }
@@ -328,6 +335,17 @@ pub fn usual_builds(
     }
     usual_builds.missing.dedup();
     Ok(usual_builds)
+}
+
+/// A build, and the same with the loops in assembly where there are such.
+type Measured = Result<Vec<Costs>, MeasureError>;
+
+fn with_assembly(policy: &Policy, target: &TargetSpec, files: &Files, build: &Build) -> Measured {
+    let mut costs = vec![measure(policy, target, files, build)?];
+    if let Some(build) = build.with_assembly(policy, target, files) {
+        costs.push(measure(policy, target, files, &build)?);
+    }
+    Ok(costs)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::fmt::{self, Write};
 use interp::decisions::{Choices, Decisions};
 use interp::duties::Duties;
 use interp::gains::Gains;
-use interp::golden::{GoldenResult, UNPROVEN};
+use interp::golden::{GoldenResult, unproven};
 use policy::{Head, Policy};
 use report::{grouped, quantity};
 use toml_input::Message;
@@ -80,7 +80,7 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
         )?;
         writeln!(out, "  = hint: {}", golden.hint())?;
     } else if report.golden.is_none() {
-        writeln!(out, "note: {UNPROVEN}")?;
+        writeln!(out, "note: {}", unproven(policy))?;
     }
     let read = report.golden.as_ref().is_none_or(GoldenResult::passed);
     // the decisions of a network that was read wrongly say nothing about its format
@@ -183,9 +183,13 @@ fn gains(policy: &Policy, gains: &Gains) -> Vec<String> {
         worst,
     } = gains;
     let word = if gains.kept() { "" } else { "DIFFERENT: " };
+    let range = worst
+        .as_ref()
+        .map(|worst| format!(", {} of gain {}", quantity(worst.range, "", 3), worst.gain));
     let mut lines = vec![format!(
-        "gains in {numeric_format}: {word}off by at most {} of their ranges, on average {} (allowed {}), {observations} observations",
+        "gains in {numeric_format}: {word}off by at most {} of their ranges{}, on average {} (allowed {}), {observations} observations",
         quantity(*largest, "", 2),
+        range.unwrap_or_default(),
         quantity(*mean, "", 2),
         quantity(*allowed, "", 3),
     )];

@@ -155,11 +155,12 @@ pub struct Replay {
     #[arg(long, value_parser = format())]
     pub format: Option<NumericFormat>,
     /// If the log is equal, write it as golden answers, a safetensors file that does not exist yet: its observations, or where it does not have
-    /// all of them the contract's, with its actions or duties. Not of a log whose actions or first rows are not compared
+    /// all of them the contract's, with its actions or duties, those of gains where the observations tell their law. Rows that the controller
+    /// never answers are left out. Not of a log whose actions or first rows are not compared
     #[arg(long, value_name = "FILE", conflicts_with_all = ["exploring", "skip"])]
     pub golden: Option<PathBuf>,
     /// Largest difference that is equal, as a share of the largest logged magnitude of the feature, of a duty that is no choice
-    /// as a share of its range. What binary32 leaves of a difference of large numbers is equal as well
+    /// as a share of its range, with gains of the range of the limits. What binary32 leaves of a difference of large numbers is equal as well
     #[arg(long, value_name = "SHARE", default_value_t = ::verify::replay::TOLERANCE, value_parser = share)]
     pub tolerance: f64,
     /// Machine-readable

@@ -1,5 +1,8 @@
 //! `policyc replay`
 
+use std::path::Path;
+
+use policy::{Golden, Policy};
 use serde::Serialize;
 use toml_input::Message;
 use verify::replay::{self, Log, Wanted};
@@ -69,15 +72,34 @@ pub fn run(options: &Replay) -> Result<Outcome, Failure> {
         output::say(replay::text(&policy, &replay).trim_end())?;
     }
     if let Some((file, golden)) = golden {
-        let answers = golden.count;
         output::write_new_one(file, policy::golden_file(&policy, &golden)?, "--golden")?;
-        talk::note(&format!(
-            "{}: {answers} golden answers; name it in [network]: golden = \"{}\"",
-            file.display(),
-            file.file_name().unwrap_or_default().display()
-        ));
+        talk::note(&kept(file, &policy, &golden));
     } else if let Some(file) = &options.golden {
         talk::note(&format!("{}: not written, since the log is not equal", file.display()));
     }
     Ok(if equal { Outcome::Done } else { Outcome::Different })
+}
+
+/// What is said of golden answers that were written.
+fn kept(file: &Path, policy: &Policy, golden: &Golden) -> String {
+    let tolerance = replay::tolerance(policy, golden);
+    let tolerance = tolerance.map(|share| {
+        format!(", and golden_tolerance = {share} beside it, for the digits of the log are farther off the network than the contract allows")
+    });
+    let rows = golden.count + golden.outside;
+    let left_out = (golden.outside > 0).then(|| {
+        format!(
+            "; {} of {rows} rows are left out: a signal is outside its range there, or the observation is none that a plausible measurement \
+             gives, and the controller never answers it",
+            golden.outside
+        )
+    });
+    format!(
+        "{}: {} golden answers; name it in [network]: golden = \"{}\"{}{}",
+        file.display(),
+        golden.count,
+        file.file_name().unwrap_or_default().display(),
+        tolerance.unwrap_or_default(),
+        left_out.unwrap_or_default()
+    )
 }

@@ -129,17 +129,27 @@ pub(super) const L_SATURATION: Cause = Cause {
             "inductance that falls with current",
             &[
                 // the bound is the plant's; it bends from below the usual current to far above, where it is a smaller L
-                knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.95, 0.1)),
+                knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.99, 0.1)),
                 knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
             ],
             Search::From(&[&[0.3, 6.0], &[0.3, 12.0], &[0.3, 25.0], &[4.0, 12.0]]),
         ),
+        // the law of data sheets, whose exponent is twice the steepness; it loses all, and half of it about where the inductor is rated
+        searched(
+            "inductance that falls with current as that of a powder core",
+            &[
+                knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.99, 0.1)),
+                knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
+                knob("steepness", &["inductor.steepness"], Reach::Plain(0.5, 2.0, 0.1)),
+            ],
+            Search::From(&[&[9.5, 15.0, 8.0], &[9.5, 25.0, 8.0], &[9.5, 12.0, 14.0]]),
+        ),
         searched(
             "inductance that falls steeply with current",
             &[
+                // a steep core that loses more swings for ever where its current stops, and no settled point of it comes to rest
                 knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.95, 0.1)),
                 knob("i_sat", &["inductor.i_sat"], Reach::Current(0.3, 8.0, 0.1)),
-                // the plant's bounds: from a powder core to one that falls within a tenth of i_sat
                 knob("steepness", &["inductor.steepness"], Reach::Plain(1.0, 32.0, 0.5)),
             ],
             Search::Knee,

@@ -252,7 +252,7 @@ impl Walk<'_> {
         }
         let weights = (0..outputs).flat_map(|output| (0..inputs).map(move |input| (output, input)));
         self.layers.push(Layer {
-            name: node.name.clone(),
+            name: node.label().to_owned(),
             inputs,
             outputs,
             weights: weights.map(|(output, input)| at(output, input)).collect(),

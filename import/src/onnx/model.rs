@@ -28,6 +28,17 @@ pub(crate) struct Node {
     pub texts: BTreeMap<String, String>,
 }
 
+impl Node {
+    /// What people know it by: its name, which ONNX does not ask for; else the tensor of its weights, else what it gives.
+    pub fn label(&self) -> &str {
+        let has_weights = matches!(self.operation.as_str(), "Gemm" | "MatMul");
+        let weights = self.inputs.get(1).filter(|_| has_weights);
+        let known = [Some(&self.name), weights, self.outputs.first()];
+        let mut known = known.into_iter().flatten();
+        known.find(|name| !name.is_empty()).map_or("", String::as_str)
+    }
+}
+
 #[derive(Debug, Default)]
 pub(crate) struct Graph {
     pub nodes: Vec<Node>,

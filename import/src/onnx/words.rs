@@ -6,7 +6,7 @@ use super::model::Node;
 use crate::activations;
 
 pub(super) fn named(node: &Node) -> String {
-    format!("{} `{}`", node.operation.escape_debug(), node.name.escape_debug())
+    format!("{} `{}`", node.operation.escape_debug(), node.label().escape_debug())
 }
 
 pub(super) fn other(what: &str, found: &str, expected: &str) -> Message {

@@ -112,7 +112,12 @@ pub(crate) fn read(
     };
     let has_duty = matches!(shape.head, Head::Schedule(_)) && view("duty").is_some() && !bounds.is_empty();
     let told = match (shape.head, has_duty) {
-        (Head::Schedule(head), true) => part(file, "duty", faults, Told::of(head, bounds)),
+        (Head::Schedule(head), true) => part(
+            file,
+            "duty",
+            faults,
+            Told::of(head, bounds).map_err(|text| catalogue::golden_law(&text)),
+        ),
         _ => Some(Told::default()),
     };
     let seen = obs.as_deref().map(|obs| seen(obs, rows, bounds));
@@ -339,6 +344,18 @@ impl Seen {
     }
 }
 
+impl Feature {
+    /// Whether a plausible measurement gives this observation, or one that lies as near as a trainer's own arithmetic.
+    #[must_use]
+    pub fn can_be(&self, observation: f64) -> bool {
+        let (low, high) = (self.bound.low, self.bound.high);
+        // 17 units of binary32: the trainer scales and clips in an order of its own
+        let slack = 1e-6 * low.abs().max(high.abs());
+        // what is no number is not outside: another check refuses it
+        !(observation < low - slack || observation > high + slack)
+    }
+}
+
 /// The rows that lie within the bounds, give or take a few roundings of the trainer's own arithmetic.
 fn seen(observations: &[f32], rows: usize, features: &[Feature]) -> Seen {
     let mut seen = Seen {
@@ -350,12 +367,8 @@ fn seen(observations: &[f32], rows: usize, features: &[Feature]) -> Seen {
         return seen;
     }
     for (row, values) in observations.chunks_exact(features.len()).enumerate() {
-        let outside = values.iter().zip(features).find(|(value, feature)| {
-            let (low, high, value) = (feature.bound.low, feature.bound.high, f64::from(**value));
-            // 17 units of binary32: the trainer scales and clips in an order of its own
-            let slack = 1e-6 * low.abs().max(high.abs());
-            value < low - slack || value > high + slack
-        });
+        let mut both = values.iter().zip(features);
+        let outside = both.find(|(value, feature)| !feature.can_be(f64::from(**value)));
         match outside {
             None => seen.rows.push(row),
             Some((value, feature)) if seen.first_outside.is_none() => {

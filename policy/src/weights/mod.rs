@@ -24,6 +24,7 @@ pub use golden_file::golden_file;
 use layers::{Dense, Layers};
 pub use tensors::NamedTensor;
 use tensors::Tensors;
+pub use told::law_told;
 
 /// The layers of the network, without bounds, and what was converted or left out.
 pub(crate) struct Weights {

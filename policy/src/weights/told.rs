@@ -1,9 +1,6 @@
 //! What an observation tells of the law of a gain schedule, so that a golden duty can be held against it.
 
-use toml_input::Message;
-
-use super::catalogue;
-use crate::model::{Expr, Factor, Feature, Schedule};
+use crate::model::{Expr, Factor, Feature, Policy, Schedule};
 
 /// Where base and factors come from, in the order of the sum; empty where nothing is to be told.
 #[derive(Default)]
@@ -20,15 +17,15 @@ enum From {
 
 impl Told {
     /// # Errors
-    /// What the law reads and no feature passes on.
-    pub fn of(head: &Schedule, features: &[Feature]) -> Result<Self, Message> {
+    /// What the law reads and no feature passes on, as the contract has it.
+    pub fn of(head: &Schedule, features: &[Feature]) -> Result<Self, String> {
         let source = |tree: &Expr, text: &str| {
             if let Expr::Constant(value) = tree {
                 return Ok(From::Constant(*value));
             }
             let same = |feature: &Feature| feature.filters.is_empty() && feature.source == *tree;
             let index = features.iter().position(same);
-            index.map(From::Feature).ok_or_else(|| catalogue::golden_law(text))
+            index.map(From::Feature).ok_or_else(|| text.to_owned())
         };
         let mut values = vec![source(&head.base.tree, &head.base.text)?];
         for gain in &head.gains {
@@ -56,6 +53,23 @@ impl Told {
         };
         rows.flat_map(row).collect()
     }
+}
+
+impl Policy {
+    /// Whether a log of observations and of what was commanded says what the network answered: golden answers can be made of it.
+    #[must_use]
+    pub fn log_tells_answers(&self) -> bool {
+        let told = |head| Told::of(head, &self.features).is_ok();
+        self.head.schedule().is_none_or(told)
+    }
+}
+
+/// Base and factors of a gain schedule in each row of observations, as [`Golden::law`](crate::Golden::law) has them.
+///
+/// # Errors
+/// The first source of the law that no observation tells, as the contract has it.
+pub fn law_told(head: &Schedule, features: &[Feature], observations: &[f32]) -> Result<Vec<f64>, String> {
+    Ok(Told::of(head, features)?.law(observations, features))
 }
 
 /// The value before scale and offset; NaN at an end of the clip, behind which it may be any.

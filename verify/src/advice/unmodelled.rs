@@ -13,10 +13,11 @@ use policy::{NumericFormat, Policy};
 use report::grouped;
 use targets::TargetSpec;
 
-use super::{arrows, in_format, others, trained_for_the_whole, what_it_changes};
+use super::{arrows, in_format, others, trained_for_the_whole, tried, what_it_changes};
 use crate::budget::{Clock, Slot};
 use crate::costs::StepCosts;
-use crate::fitting::{Bench, Fitting, Widest};
+use crate::fitting::{Bench, Candidate, Fitting, Widest};
+use crate::measure::Costs;
 
 /// A branch may be folded into the instructions beside it, so that a cycle ends more than begin in it: in the loops of a network less
 /// than a tenth of the instructions are branches.
@@ -39,10 +40,25 @@ struct Case<'a> {
 /// What a step needs in a numeric format, in the shortest build.
 struct Need {
     format: NumericFormat,
-    build: String,
+    /// The shortest first.
+    builds: Vec<String>,
     instructions: u64,
     /// Instructions for each cycle.
     a_cycle: f64,
+}
+
+impl Need {
+    fn build(&self) -> &str {
+        self.builds.first().map_or("", String::as_str)
+    }
+
+    fn candidate(&self) -> Candidate {
+        Candidate {
+            format: self.format,
+            builds: self.builds.clone(),
+            takes: self.a_cycle,
+        }
+    }
 }
 
 /// Who cannot do it.
@@ -99,10 +115,12 @@ pub(super) fn lines(
 
 impl Case<'_> {
     fn need(&self, format: NumericFormat, costs: &StepCosts) -> Option<Need> {
-        let least = costs.measured().min_by_key(|costs| costs.instructions_max)?;
+        let mut ranked: Vec<&Costs> = costs.measured().collect();
+        ranked.sort_by_key(|costs| costs.instructions_max);
+        let least = ranked.first()?;
         Some(Need {
             format,
-            build: least.build.clone(),
+            builds: ranked.iter().map(|costs| costs.build.clone()).collect(),
             instructions: least.instructions_max,
             a_cycle: least.instructions_max as f64 / self.cycles,
         })
@@ -142,7 +160,7 @@ impl Case<'_> {
         let is_many = format!(
             "{} instructions in the shortest build, {}, are {:.2} for each of {} cycles at {}",
             grouped(own.instructions),
-            own.build,
+            own.build(),
             own.a_cycle,
             grouped(self.cycles as u64),
             self.clock
@@ -169,7 +187,7 @@ impl Case<'_> {
                  cycle or more, with its wait states",
                 self.cycles_alone(),
                 grouped(own.instructions),
-                own.build,
+                own.build(),
                 own.a_cycle
             ),
         }
@@ -190,16 +208,15 @@ impl Case<'_> {
                 "  = hint: --format {} needs {:.2} instructions a cycle with {}, and the board decides{}",
                 need.format.name(),
                 need.a_cycle,
-                need.build,
+                need.build(),
                 what_it_changes(self.policy, need.format)
             )];
         }
         let all = || std::iter::once(own).chain(rest);
         let least = all().map(|need| need.a_cycle).fold(f64::INFINITY, f64::min);
         let nearest = all().find(|need| need.a_cycle <= ALIKE * least).unwrap_or(own);
-        let Need {
-            format, build, a_cycle, ..
-        } = nearest;
+        let Need { format, a_cycle, .. } = nearest;
+        let build = nearest.build();
         let mut lines: Vec<String> = self.whole_period(all()).into_iter().collect();
         lines.push(format!(
             "  = hint: no numeric format comes down to one instruction a cycle; next to it comes {} with {build}, {a_cycle:.2}: one \
@@ -212,27 +229,35 @@ impl Case<'_> {
         let bench = Bench {
             target: self.target,
             outputs: self.outputs,
-            build,
             clock: self.clock,
         };
-        let policy = self.policy.clone().with_format(*format);
-        if let Some((a_cycle, _)) = bench.with_relu(&policy) {
+        if let Some((a_cycle, _)) = bench.with_relu(&self.policy.clone().with_format(*format), build) {
             lines.push(format!(
                 "  = hint: trained with relu the same network needs {a_cycle:.2} in {} with {build}",
                 format.name()
             ));
         }
-        match bench.widest(&policy) {
-            Widest::Fits(Fitting { sizes, share }) => lines.push(format!(
+        let candidates: Vec<Candidate> = all().map(Need::candidate).collect();
+        match bench.widest(self.policy, &candidates) {
+            Widest::Fits(Fitting {
+                sizes,
+                format,
+                build,
+                share,
+            }) => lines.push(format!(
                 "  = hint: this network cut down to {} needs {:.2} in {} with {build}: train one of that size or below; the board decides",
                 arrows(&sizes),
                 share.0,
                 format.name()
             )),
-            Widest::None => lines.push(format!(
-                "  = hint: in {} with {build} not even four neurons in each hidden layer come down to one instruction a cycle: a faster clock, \
-                 a longer period or another processor is needed",
-                format.name()
+            Widest::None(smallest, formats) => lines.push(format!(
+                "  = hint: not even four neurons in each hidden layer come down to one instruction a cycle, tried in {}: {} needs {:.2} in \
+                 {} with {}; a faster clock, a longer period or another processor is needed",
+                tried(&formats),
+                arrows(&smallest.sizes),
+                smallest.share.0,
+                smallest.format.name(),
+                smallest.build
             )),
             Widest::Unknown => {}
         }
@@ -249,7 +274,7 @@ impl Case<'_> {
             "{}: {} with {} needs {:.2} instructions a cycle then",
             trained_for_the_whole(self.policy),
             fits.format.name(),
-            fits.build,
+            fits.build(),
             part * fits.a_cycle
         ))
     }

@@ -185,7 +185,7 @@ impl Log {
     }
 
     /// The logged values of a signal, in its unit.
-    fn physical(&self, policy: &Policy, index: usize) -> impl Iterator<Item = f64> {
+    pub(super) fn physical(&self, policy: &Policy, index: usize) -> impl Iterator<Item = f64> {
         let adc = policy.signals.get(index).and_then(|signal| signal.adc);
         let value = move |samples: &Vec<Sample>| match (samples.get(index), adc) {
             (Some(Sample::Physical(value)), _) => f64::from(*value),

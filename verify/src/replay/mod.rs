@@ -12,6 +12,7 @@
 mod answers;
 mod chain;
 mod chosen;
+mod course;
 mod duties;
 mod explain;
 mod integral;
@@ -24,19 +25,18 @@ mod values;
 mod variants;
 
 use interp::decisions::Decisions;
-use interp::{Controller, Real, Trace};
-use policy::{DutyPath, Policy, Scalar};
+use policy::{DutyPath, NumericFormat, Policy, Scalar};
 use serde::Serialize;
-use toml_input::{Faults, Message};
+use toml_input::Faults;
 
-pub use answers::answers;
+pub use answers::{answers, tolerance};
 pub use duties::DutyResult;
 pub use log::Log;
 pub use text::text;
 
+use course::course;
 use duties::Logged;
-use explain::{Course, OutputCourse};
-use log::Done;
+use explain::OutputCourse;
 use values::{allowed, ends};
 
 /// What differs less than this share of the largest logged magnitude is equal.
@@ -70,6 +70,12 @@ pub struct Replay {
     /// What an integer format changes of the decisions, where all that the log has is equal in floats.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<Decisions>,
+    /// Rows that do not count in `format`: the controller never answers them.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub uncounted: usize,
+    /// The contract is one of integers, and all but `format` is what it makes of the log in f32.
+    #[serde(skip)]
+    pub in_floats: bool,
     /// Share of the largest logged magnitude of a feature that is still equal.
     pub tolerance: f64,
     /// What a reader of the log should know.
@@ -207,13 +213,24 @@ pub struct Wanted {
 /// # Errors
 /// A duty in the log that no action of the contract commands.
 pub fn replay(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faults> {
-    let mut replay = compared(policy, log, wanted)?;
-    replay.late = late::column(policy, log, wanted, &replay);
+    // a contract that is wrong in floats is wrong whatever the format does on top of it
+    let in_floats = policy.numeric_format.is_integer() && !wanted.exploring;
+    let float = in_floats.then(|| policy.clone().with_format(NumericFormat::F32));
+    let held = float.as_ref().unwrap_or(policy);
+    let mut replay = compared(held, log, wanted)?;
+    replay.in_floats = in_floats;
+    replay.late = late::column(held, log, wanted, &replay);
     // what an integer format changes is said where it changes nothing, too
-    if replay.late.is_none() {
-        replay.format = answers::changed(policy, log, wanted)?;
+    if in_floats && replay.late.is_none() && replay.equal() {
+        (replay.format, replay.uncounted) = answers::changed(policy, log, wanted)?;
     }
     Ok(replay)
+}
+
+// of a count that is left out of the JSON, as serde asks for it
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// The same without a search for a column that is late.
@@ -289,6 +306,8 @@ fn compared(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faults
         outputs: several,
         late: None,
         format: None,
+        uncounted: 0,
+        in_floats: false,
         outside: log.outside(policy),
         tolerance,
         notes: log.notes.clone(),
@@ -378,76 +397,5 @@ fn compare(own: &[f64], logged: &[f64], log: &Log, allowed: f64, late: &[bool]) 
             .position(|difference| !is_equal(difference))
             .map(|row| log.line(row)),
         explanation: None,
-    }
-}
-
-/// The interpreter over all rows, with the trainer's duties behind each.
-fn course<T: Real>(policy: &Policy, log: &Log) -> Result<Course, Faults> {
-    let mut controller = Controller::<T>::new(policy);
-    let mut trace = controller.blank_trace();
-    let mut course = Course::new(policy, &log.begins);
-    let paths = policy.paths();
-    let of = |(path, done)| Logged {
-        policy,
-        path,
-        log,
-        done,
-    };
-    let before: Vec<Vec<Option<f64>>> = paths.iter().zip(&log.done).map(of).map(duties::before).collect();
-    for (row, samples) in log.samples.iter().enumerate() {
-        if log.begins.get(row).copied().unwrap_or(row == 0) {
-            controller.reset();
-        }
-        let mut state = controller.state().clone();
-        for (output, before) in before.iter().enumerate() {
-            if let Some(duty) = before.get(row).copied().flatten() {
-                let mut own = state.output(output);
-                own.previous_duty = T::nearest(duty);
-                state.set_output(output, own);
-            }
-        }
-        controller.restore(&state);
-        controller.eval_into(samples, &mut trace)?;
-        if !trace.sound {
-            return Err(log.fault(row, no_duty(&controller)).into());
-        }
-        course.push(&trace);
-        let q: Vec<f64> = trace.q_values.iter().map(|q| q.to_f64()).collect();
-        for (output, (path, done)) in paths.iter().zip(&log.done).enumerate() {
-            let logged = done.actions.as_ref().and_then(|actions| actions.get(row));
-            if let (Some(logged), Some(own)) = (logged, course.outputs.get_mut(output)) {
-                let q = q.get(path.columns()).unwrap_or_default();
-                own.gives_up(q, [trace.decision(output).action_index, *logged]);
-            }
-        }
-        for (output, done) in log.done.iter().enumerate() {
-            apply(&controller, &mut trace, (output, done), row);
-        }
-        course.commanded(&trace);
-        controller.commit_trace(&trace);
-    }
-    Ok(course)
-}
-
-fn no_duty<T: Real>(controller: &Controller<T>) -> Message {
-    let state = controller.state();
-    let before = (0..state.outputs()).map(|output| state.output(output).previous_duty.to_f64().to_string());
-    let before: Vec<String> = before.collect();
-    Message::new("the duty before this row is none that the contract's actions command")
-        .found(before.join(", "))
-        .expected("one between the smallest and the largest of [actions] duties, initial_duty and the fallback's")
-}
-
-/// Puts what the trainer applied to an output in the place of the controller's own command.
-fn apply<T: Real>(controller: &Controller<T>, trace: &mut Trace<T>, (output, done): (usize, &Done), row: usize) {
-    if let Some(actions) = &done.actions {
-        if let Some(action) = actions.get(row) {
-            controller.choose_of(trace, output, *action);
-        }
-    } else if let Some(duty) = done.duty.as_ref().and_then(|duties| duties.get(row)) {
-        let mut decision = trace.decision(output);
-        decision.command.duty_sim = T::nearest(*duty);
-        decision.command.duty = decision.command.duty_sim;
-        trace.set_decision(output, decision);
     }
 }

@@ -89,17 +89,22 @@ fn words(policy: &Policy, replay: &Replay) -> Vec<String> {
         }
     }
     words.extend(unreached_words(policy, replay));
-    match &replay.format {
-        Some(decisions) => {
-            // rows of the log stand in the place of golden vectors
-            let lines = crate::text::decisions(policy, decisions).into_iter();
-            words.extend(lines.map(|line| line.replace("most at golden vector", "most in row (from 0)")));
-        }
-        None => {
-            for (output, path) in replay.commands().into_iter().zip(policy.paths()) {
-                words.extend(command_words(policy, replay, output, &path));
-            }
-        }
+    for (output, path) in replay.commands().into_iter().zip(policy.paths()) {
+        words.extend(command_words(policy, replay, output, &path));
+    }
+    if let Some(decisions) = &replay.format {
+        // rows of the log stand in the place of golden vectors
+        let lines = crate::text::decisions(policy, decisions).into_iter();
+        words.extend(lines.map(|line| line.replace("most at golden vector", "most in row (from 0)")));
+    }
+    if replay.uncounted > 0 {
+        words.push(format!(
+            "{} of {} do not count in what {} changes: a signal is outside its range there, or an observation is none that a plausible \
+             measurement gives, and the controller never computes that decision",
+            grouped(replay.uncounted as u64),
+            counted(replay.rows, "row"),
+            policy.numeric_format.name()
+        ));
     }
     for (signal, rows, [low, high]) in &replay.outside {
         words.push(format!(
@@ -130,11 +135,19 @@ fn command_words(policy: &Policy, replay: &Replay, output: Commanded<'_>, path: 
             1 => ", 1 tie apart".to_owned(),
             ties => format!(", {} ties apart", grouped(ties as u64)),
         };
+        // that of a gain is another one, and what a format does is told as a share of that
+        let range = match path.head.schedule().and(path.head.duty_span()) {
+            Some(span) => format!("the range of the limits, {}", number(span)),
+            None => "its range".to_owned(),
+        };
         let worst = actions.worst.map_or(String::new(), |(share, line)| match share > 0.0 {
-            true => format!(", largest difference {} of its range, in line {line}", number(share)),
+            true => format!(", largest difference {} of {range}, in line {line}", number(share)),
             false => ", to the last digit".to_owned(),
         });
-        words.push(format!("{of}{command} equal in {equal} of {rows}{ties}{told}{worst}"));
+        let in_floats = if replay.in_floats { " in f32" } else { "" };
+        words.push(format!(
+            "{of}{command} equal in {equal} of {rows}{in_floats}{ties}{told}{worst}"
+        ));
         if actions.ties > 0 {
             words.push(format!(
                 "a tie: both actions have the same Q value within golden_tolerance, {} of the largest; a rounding chose between them",
@@ -254,11 +267,20 @@ fn verdict(policy: &Policy, replay: &Replay) -> String {
         return by_format(policy, decisions) + &beyond_ranges(replay);
     }
     let kind = Kind::of(policy, replay);
+    let format = policy.numeric_format.name();
     if !replay.equal() {
-        return different(replay, &kind);
+        let in_floats = match replay.in_floats {
+            true => format!(". All of this in f32: what {format} changes is judged where that is equal"),
+            false => String::new(),
+        };
+        return different(replay, &kind) + &in_floats;
     }
     let has_commands = replay.commands().iter().any(|output| output.actions.is_some());
-    equal(replay, &kind, compared, has_commands) + &beyond_ranges(replay)
+    let unjudged = match replay.in_floats {
+        true => format!("; in f32, and of {format} nothing is said: the log has no row that the controller answers"),
+        false => String::new(),
+    };
+    equal(replay, &kind, compared, has_commands) + &unjudged + &beyond_ranges(replay)
 }
 
 /// Where everything is equal in floats.

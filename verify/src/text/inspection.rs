@@ -1,7 +1,7 @@
 //! A policy in words.
 
 use codegen::manifest;
-use interp::golden::{UNPROVEN, golden_result};
+use interp::golden::{golden_result, unproven};
 use policy::{Policy, describe};
 
 use super::decisions;
@@ -27,7 +27,7 @@ pub fn inspection(policy: &Policy) -> String {
 /// What the trainer's vectors show of the network, and what the numeric format does to his decisions.
 fn golden(policy: &Policy) -> Vec<String> {
     let Some(golden) = golden_result(policy) else {
-        return vec![UNPROVEN.to_owned()];
+        return vec![unproven(policy)];
     };
     let mut lines = vec![format!("{} golden vectors: {golden}", golden.vectors)];
     if let Some(found) = interp::decisions::decisions(policy, None) {

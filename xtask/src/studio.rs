@@ -42,10 +42,14 @@ pub fn build(workspace: &Workspace, output: &Output, limit: Duration) -> Result<
     let mut copied = 0;
     let mut copy = |from: &Path, name: &str| -> Result<(), String> {
         copied += 1;
-        write(
-            &out.join(name),
-            &std::fs::read(from).map_err(|error| told(from, &error))?,
-        )
+        let bytes = std::fs::read(from).map_err(|error| told(from, &error))?;
+        match Path::new(name).extension() {
+            Some(end) if end == "js" => write(
+                &out.join(name),
+                without_comments(&String::from_utf8_lossy(&bytes)).as_bytes(),
+            ),
+            _ => write(&out.join(name), &bytes),
+        }
     };
     for entry in std::fs::read_dir(&page).map_err(|error| told(&page, &error))? {
         let path = entry.map_err(|error| told(&page, &error))?.path();
@@ -65,6 +69,15 @@ pub fn build(workspace: &Workspace, output: &Output, limit: Duration) -> Result<
         )?;
     }
     Ok(Ok(vec![format!("{copied} files, and {}", lengths.join(", "))]))
+}
+
+/// A script without the lines that are comments alone, a tenth of what the scripts take compressed; the others keep their numbers.
+fn without_comments(script: &str) -> String {
+    let kept = |line: &str| match line.trim_start().starts_with("//") {
+        true => "\n".to_owned(),
+        false => format!("{line}\n"),
+    };
+    script.lines().map(kept).collect()
 }
 
 /// The modules with their names.

@@ -52,16 +52,18 @@ pub const EFFECT: Effect = Effect {
 pub(crate) fn relative_inductance(inductor: &Inductor, i: f64) -> f64 {
     // a rational law: one with an exponential would need libm, whose bits differ between machines
     let x = i / inductor.i_sat;
-    let y = power(x * x, inductor.steepness);
+    let square = x * x;
+    let y = match inductor.steepness {
+        1.0 => square,
+        other => power(square, other),
+    };
     1.0 - inductor.saturation * y / (1.0 + y)
 }
 
 /// `square^steepness`; between whole numbers along a line, below 1 between quarters of the exponent of its root.
-#[inline]
+// in one place: the law stands in every form of the circuit, and the page of the studio loads them all
+#[inline(never)]
 fn power(square: f64, steepness: f64) -> f64 {
-    if steepness == 1.0 {
-        return square;
-    }
     if steepness < 1.0 {
         return soft(square.sqrt(), 2.0 * steepness).min(1e300);
     }

@@ -70,11 +70,10 @@ impl Desk {
 
     fn has(&self, need: &str) -> bool {
         let without = std::env::var("POLICYC_WITHOUT_RUST_TARGETS").unwrap_or_default();
-        let script = if need.contains("-none-") {
-            format!("ls \"$(rustc --print target-libdir --target {need})\"/libcore-*")
-        } else {
-            format!("command -v {need}")
-        };
+        // `arm-none-eabi-gcc` is a program and `thumbv7em-none-eabihf` a target: rustc knows which
+        let script = format!(
+            "if rustc --print target-list | grep -qxF '{need}'; then ls \"$(rustc --print target-libdir --target '{need}')\"/libcore-*; else command -v '{need}'; fi"
+        );
         let known = !without.split(',').any(|target| target == need) && !is_without(need);
         let mut shell = self.shell();
         shell.args(["-c", &script]).stdout(Stdio::null()).stderr(Stdio::null());

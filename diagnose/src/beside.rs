@@ -80,9 +80,11 @@ pub fn notes(problem: &Problem, attribution: &Attribution, profiles: &[Profile])
                 .map(|value| profile.value + scale * (joint.shift + joint.slope * ((value - at) / step - joint.other)));
             ends.sort_by(f64::total_cmp);
             let [below, above] = [profile.value - profile.interval[0], profile.interval[1] - profile.value];
+            // a line leads anywhere; no value lies beyond what the parameter can be
+            let [least, most, _] = fitter.range(*place);
             let interval = [
-                (ends[0] - below).min(profile.interval[0]),
-                (ends[1] + above).max(profile.interval[1]),
+                (ends[0] - below).max(least).min(profile.interval[0]),
+                (ends[1] + above).min(most).max(profile.interval[1]),
             ];
             if reach[0] < reach[1] && interval[1] - interval[0] > WIDER * (below + above) {
                 widened.push(Widened {
@@ -149,7 +151,7 @@ fn sentence(attribution: &Attribution, profile: &Profile, widened: &[Widened]) -
     });
     let with: Vec<String> = with.collect();
     Some(format!(
-        "{name} from {} holds if nothing else is off; these records also allow {}",
+        "{name} from {} holds if nothing else is off; to first order these records also allow {}",
         range(profile.interval, profile.unit),
         with.join(", or ")
     ))

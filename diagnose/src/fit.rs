@@ -334,15 +334,16 @@ impl Fitter<'_> {
     ) -> Option<(State, Vec<f64>)> {
         // each try damps ten times more: what does not descend with a step of 1e-5 does not descend
         for _ in 0..5 {
-            let step = round.normal.step(*damping);
-            let mut moved = values.to_vec();
             let mut model = state.model.clone();
             let mut left = state.residual.clone();
+            let moved = self.stepped(round, values, *damping);
             for (k, n) in round.smooth.iter().enumerate() {
                 let place = round.places[*n];
-                let [low, high, unit] = self.range(place);
-                moved[*n] = (values[*n] + step[k] * unit).clamp(low, high);
-                axpy(&mut left, -(moved[*n] - values[*n]) / unit, &round.jacobian.raw[k]);
+                axpy(
+                    &mut left,
+                    -(moved[*n] - values[*n]) / self.range(place)[2],
+                    &round.jacobian.raw[k],
+                );
                 self.set(&mut model, place, moved[*n]);
             }
             if !Work::may_simulate(&model, &self.problem.base) {
@@ -363,6 +364,31 @@ impl Fitter<'_> {
             *damping *= 10.0;
         }
         None
+    }
+
+    /// Values behind a step. A parameter that would leave its range stays at the end of it, and the others take the step that is best then:
+    /// the one that they take beside it outside of the range leads nowhere where two of them do nearly the same.
+    fn stepped(&self, round: &Round<'_>, values: &[f64], damping: f64) -> Vec<f64> {
+        let mut moved = values.to_vec();
+        let mut ends: Vec<Option<f64>> = vec![None; round.smooth.len()];
+        // each pass holds one more, so there are no more passes than parameters
+        for _ in 0..=round.smooth.len() {
+            let step = round.normal.step_beside(damping, &ends);
+            let mut new = None;
+            for (k, n) in round.smooth.iter().enumerate() {
+                let [low, high, unit] = self.range(round.places[*n]);
+                let aim = values[*n] + step[k] * unit;
+                moved[*n] = aim.clamp(low, high);
+                let beyond = (aim - moved[*n]).abs() / unit;
+                if ends[k].is_none() && beyond > new.map_or(0.0, |(most, _)| most) {
+                    new = Some((beyond, k));
+                }
+            }
+            let Some((_, k)) = new else { break };
+            let n = round.smooth[k];
+            ends[k] = Some((moved[n] - values[n]) / self.range(round.places[n])[2]);
+        }
+        moved
     }
 
     /// Sensitivities of all smooth parameters at `state`, projected, in units of their steps.

@@ -35,13 +35,31 @@ impl Normal {
     }
 
     pub(crate) fn step(&self, damping: f64) -> Vec<f64> {
+        self.step_beside(damping, &[])
+    }
+
+    /// The step of the others where those with a value take that one.
+    pub(crate) fn step_beside(&self, damping: f64, given: &[Option<f64>]) -> Vec<f64> {
+        let given: Vec<Option<f64>> = (0..self.right.len()).map(|n| given.get(n).copied().flatten()).collect();
         let mut matrix = self.matrix.clone();
+        let mut right = self.right.clone();
         for (n, row) in matrix.iter_mut().enumerate() {
             // a parameter without any effect has an equation of zeros; that of any other counts squared deviations in noises,
             // and is far above this
             row[n] = row[n] * (1.0 + damping) + 1e-12;
+            for (m, value) in given.iter().enumerate() {
+                let Some(value) = value else { continue };
+                right[n] -= row[m] * value;
+                row[m] = 0.0;
+            }
         }
-        solve(&matrix, &self.right)
+        for (n, value) in given.iter().enumerate() {
+            let Some(value) = value else { continue };
+            matrix[n].fill(0.0);
+            matrix[n][n] = 1.0;
+            right[n] = *value;
+        }
+        solve(&matrix, &right)
     }
 
     pub(crate) fn covariance(&self, smooth: &[usize], scale: &[f64], out: &mut [Vec<f64>]) {
@@ -101,7 +119,17 @@ pub fn solve(matrix: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::solve;
+    use super::{Normal, solve};
+
+    #[test]
+    fn a_given_step_is_taken_and_the_others_take_the_best_one_beside_it() {
+        let normal = Normal::new(&[vec![1.0, 0.0], vec![1.0, 1.0]], &[3.0, 5.0]);
+        let free = normal.step_beside(0.0, &[None, None]);
+        assert!((free[0] + 2.0).abs() < 1e-6 && (free[1] - 5.0).abs() < 1e-6, "{free:?}");
+        let beside = normal.step_beside(0.0, &[None, Some(1.0)]);
+        // 3 - 1 is left for the first
+        assert!((beside[0] - 2.0).abs() < 1e-6 && beside[1] == 1.0, "{beside:?}");
+    }
 
     #[test]
     fn a_system_is_solved_and_a_direction_without_weight_stays_at_0() {

@@ -108,6 +108,13 @@ impl<T: Real> Controller<T> {
         let ends = self.sound.ends(mappings).into_iter();
         ends.map(|range| range.map(|range| (range.lo, range.hi))).collect()
     }
+
+    /// Least and largest duty that an output can have commanded before a step (section 1); `None` where no step reads it.
+    #[must_use]
+    pub fn duty_before(&self, output: usize) -> Option<(T, T)> {
+        let range = self.sound.outputs.get(output)?.previous_duty?;
+        Some((range.lo, range.hi))
+    }
 }
 
 /// From the smallest to the largest of some numbers.

@@ -251,10 +251,7 @@ fn replay_takes_previous_duty_from_the_log() {
     );
     desk.succeed("replay buck12 log.csv --skip 1");
     desk.write("log.csv", &log("previous_duty", &|_| 0.9, &|_| 4.0));
-    desk.refuse(
-        "replay buck12 log.csv",
-        &["none that the contract's actions command", "0.9"],
-    );
+    desk.refuse("replay buck12 log.csv", &["none that the controller commands", "0.9"]);
 }
 
 #[test]

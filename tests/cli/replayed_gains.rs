@@ -173,6 +173,58 @@ fn rows_that_the_controller_never_answers_are_no_golden_answers_and_do_not_judge
     assert!(replayed.contains(&apart), "{replayed}");
 }
 
+/// 0.8 in binary32 lies above the limit of 0.8 that the controller rounds inwards: a trainer that clips there logs it all the same.
+#[test]
+fn a_duty_at_its_limit_is_that_of_the_controller() {
+    let desk = desk();
+    let policy = policy::load(&desk.path("adder/policy.toml")).unwrap();
+    for (limit, logged) in [(1, "0.800000012"), (1, "0.8"), (0, "0.1"), (0, "0.0999999940")] {
+        let mut controller = Controller::<f32>::new(&policy);
+        let mut log = "v_out,i_l,previous_duty,obs_3,duty\n".to_owned();
+        for row in 0..40 {
+            let mut state = controller.state().clone();
+            let mut own = state.output(0);
+            let ends = controller.duty_before(0).unwrap();
+            own.previous_duty = [ends.0, ends.1][limit];
+            state.set_output(0, own);
+            controller.restore(&state);
+            let samples = [100.0 + 3.0 * f64::from(row % 7), 8.0 - f64::from(row % 5)];
+            let trace = controller.eval(&samples.map(Sample::Wide)).unwrap();
+            let observation = 5.0 * logged.parse::<f64>().unwrap() - 2.5;
+            let duty = trace.decision(0).duty_sim;
+            log += &format!("{},{},{logged},{observation:.6},{duty:.8}\n", samples[0], samples[1]);
+            controller.commit_trace(&trace);
+        }
+        desk.write("log.csv", &log);
+        let ran = desk.type_in(&format!("{REPLAY} --skip 1"));
+        let all = format!("{logged}: {}{}", ran.stdout, ran.stderr);
+        assert_eq!(ran.code, Some(0), "{all}");
+        assert!(all.contains("duty equal in 40 of 40"), "{all}");
+    }
+    // farther off it is another contract's
+    desk.write(
+        "log.csv",
+        "v_out,i_l,previous_duty,obs_3\n100,8,0.8001,1.5\n100,8,0.8001,1.5\n",
+    );
+    desk.refuse(
+        REPLAY,
+        &["none that the controller commands", "0.8001", "0.1", "0.79999"],
+    );
+}
+
+/// Where every sample lies outside its range nothing is decided: equal features say nothing of a format.
+#[test]
+fn a_log_without_a_row_that_counts_says_so_of_the_format() {
+    let desk = desk();
+    desk.write("log.csv", &log(&desk, 8));
+    desk.edit("adder/policy.toml", "range = [-30.0, 30.0]", "range = [50.0, 60.0]");
+    let said = desk.type_in(&format!("{REPLAY} --format i16")).stdout;
+    for words in ["120 of 120 rows do not count", "; this log says nothing of it"] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    assert!(!said.contains("gains in i16"), "{said}");
+}
+
 #[test]
 fn a_law_in_integers_is_held_against_f32_first_and_judged_by_golden_duty() {
     let desk = desk();

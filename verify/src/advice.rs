@@ -72,10 +72,10 @@ pub fn lines(
     match fits.or_else(nearest) {
         Some(fitting) if fitting.share.1 <= 1.0 => lines.push(format!(
             "  = hint: --format {} takes {} % with {}{}",
-            fitting.format.name(),
+            fitting.candidate.format.name(),
             percents(fitting.share),
-            fitting.build(),
-            what_it_changes(policy, fitting.format)
+            fitting.candidate.build(),
+            what_it_changes(policy, fitting.candidate.format)
         )),
         Some(nearest) => {
             let bench = Bench { target, outputs, clock };
@@ -112,8 +112,8 @@ fn whole_period(policy: &Policy, slot: Slot, all: &[&Proposal]) -> Option<String
     Some(format!(
         "{}: {} with {} takes {} % of that",
         trained_for_the_whole(policy),
-        chosen.format.name(),
-        chosen.build(),
+        chosen.candidate.format.name(),
+        chosen.candidate.build(),
         percents(whole(chosen))
     ))
 }
@@ -131,8 +131,8 @@ fn trained_for_the_whole(policy: &Policy) -> String {
 
 /// What would help where no format fits: another clock or period, a smaller network, another activation.
 fn too_slow(policy: &Policy, bench: Bench<'_>, nearest: &Proposal, all: &[&Proposal]) -> Vec<String> {
-    let Proposal { format, share, .. } = nearest;
-    let build = nearest.build();
+    let Proposal { candidate, share } = nearest;
+    let (format, build) = (candidate.format, candidate.build());
     let mut lines = vec![format!(
         "  = hint: no numeric format {}; next to it comes {} with {build}, {} %: it fills a period of {:.0} us, or the \
          present one at {:.0} MHz{}",
@@ -141,16 +141,16 @@ fn too_slow(policy: &Policy, bench: Bench<'_>, nearest: &Proposal, all: &[&Propo
         percents(*share),
         (1e6 * policy.sample_period * share.1).ceil(),
         (1e-6 * bench.clock.hz * share.1).ceil(),
-        what_it_changes(policy, *format)
+        what_it_changes(policy, format)
     )];
-    if let Some(share) = bench.with_relu(&policy.clone().with_format(*format), build) {
+    if let Some(share) = bench.with_relu(&policy.clone().with_format(format), build) {
         lines.push(format!(
             "  = hint: trained with relu the same network takes {} % in {} with {build}",
             percents(share),
             format.name()
         ));
     }
-    let candidates: Vec<Candidate> = all.iter().map(|proposal| proposal.candidate()).collect();
+    let candidates: Vec<Candidate> = all.iter().map(|proposal| proposal.candidate.clone()).collect();
     match bench.widest(policy, &candidates) {
         Widest::Fits(Fitting {
             sizes,
@@ -192,7 +192,11 @@ fn what_it_changes(policy: &Policy, format: NumericFormat) -> String {
     let found = decisions(&policy.clone().with_format(format), None).filter(|decisions| !decisions.kept());
     match found {
         None if policy.golden.is_none() => {
-            "; golden answers would tell what it changes of the decisions (`policyc replay --golden` makes them of a log)".to_owned()
+            let made = match policy.log_tells_answers() {
+                true => " (`policyc replay --golden` makes them of a log)",
+                false => "",
+            };
+            format!("; golden answers would tell what it changes of the decisions{made}")
         }
         None => "; it changes no more golden decisions than allowed".to_owned(),
         Some(decisions) => {
@@ -224,9 +228,8 @@ fn arrows(sizes: &[usize]) -> String {
 /// What a format takes in its fastest build.
 #[derive(Debug, Clone)]
 struct Proposal {
-    format: NumericFormat,
-    /// The fastest first.
-    builds: Vec<String>,
+    /// `takes` is the larger share.
+    candidate: Candidate,
     share: (f64, f64),
 }
 
@@ -238,23 +241,14 @@ impl Proposal {
             .filter_map(|costs| Some((costs, Budget::of(costs, clock, policy.sample_period)?)));
         let mut ranked: Vec<(&Costs, Budget)> = budgets.collect();
         ranked.sort_by(|(_, a), (_, b)| a.share.1.total_cmp(&b.share.1));
-        Some(Self {
+        let share = ranked.first()?.1.share;
+        let builds = ranked.iter().map(|(costs, _)| costs.build.clone()).collect();
+        let candidate = Candidate {
             format: policy.numeric_format,
-            share: ranked.first()?.1.share,
-            builds: ranked.iter().map(|(costs, _)| costs.build.clone()).collect(),
-        })
-    }
-
-    fn build(&self) -> &str {
-        self.builds.first().map_or("", String::as_str)
-    }
-
-    fn candidate(&self) -> Candidate {
-        Candidate {
-            format: self.format,
-            builds: self.builds.clone(),
-            takes: self.share.1,
-        }
+            builds,
+            takes: share.1,
+        };
+        Some(Self { candidate, share })
     }
 }
 

@@ -66,6 +66,14 @@ pub struct Candidate {
     pub takes: f64,
 }
 
+impl Candidate {
+    /// Name of the fastest build.
+    #[must_use]
+    pub fn build(&self) -> &str {
+        self.builds.first().map_or("", String::as_str)
+    }
+}
+
 /// Where networks are tried.
 #[derive(Debug, Clone, Copy)]
 pub struct Bench<'a> {

@@ -26,6 +26,20 @@ pub(super) const SOURCE_IMPEDANCE: Cause = Cause {
             Search::From(&[&[4.0, 1.0], &[4.0, 20.0]]),
         ),
         searched(
+            "resistance of the source before an input capacitor that has one, too",
+            &[
+                // a capacitor that loses the output voltage within a period is none; with it the lowest resistance is NO_LAG periods
+                knob(
+                    "resistance",
+                    &["source.resistance"],
+                    Reach::ResistanceFrom(0.01, 0.5, 0.005),
+                ),
+                knob("c_in", &["source.c_in"], Reach::Capacitance(1.0, 1e4, 2.0)),
+                knob("esr_in", &["source.esr_in"], OHMS),
+            ],
+            Search::From(&[&[4.0, 3.0, 1.0], &[4.0, 20.0, 1.0]]),
+        ),
+        searched(
             "resistance and inductance of the source before an input capacitor",
             &[
                 knob("resistance", &["source.resistance"], OHMS),

@@ -217,7 +217,7 @@ pub(crate) fn golden_law(text: &str) -> Message {
         .found(format!(
             "`{text}`, which is no number and no source of a feature without filters"
         ))
-        .expected("a base that is a number, and factors that are features or such sources")
+        .expected("a base that is a number or the source of a feature, and factors that are features or such sources")
         .hint("give `output`, the network's last layer before squash or clip, in the place of `duty`")
 }
 

@@ -39,25 +39,15 @@ struct Case<'a> {
 
 /// What a step needs in a numeric format, in the shortest build.
 struct Need {
-    format: NumericFormat,
-    /// The shortest first.
-    builds: Vec<String>,
+    /// `takes` is instructions for each cycle.
+    candidate: Candidate,
     instructions: u64,
-    /// Instructions for each cycle.
-    a_cycle: f64,
 }
 
 impl Need {
-    fn build(&self) -> &str {
-        self.builds.first().map_or("", String::as_str)
-    }
-
-    fn candidate(&self) -> Candidate {
-        Candidate {
-            format: self.format,
-            builds: self.builds.clone(),
-            takes: self.a_cycle,
-        }
+    /// Instructions for each cycle.
+    fn a_cycle(&self) -> f64 {
+        self.candidate.takes
     }
 }
 
@@ -97,9 +87,14 @@ pub(super) fn lines(
     }
     let mut lines = vec![case.verdict(&own)];
     if !rest.is_empty() {
-        let each = rest
-            .iter()
-            .map(|need| format!("{:.2} in {}{}", need.a_cycle, need.format.name(), case.in_short(need)));
+        let each = rest.iter().map(|need| {
+            format!(
+                "{:.2} in {}{}",
+                need.a_cycle(),
+                need.candidate.format.name(),
+                case.in_short(need)
+            )
+        });
         let each: Vec<String> = each.collect();
         lines.push(format!("  in the other formats it needs {}", each.join(", ")));
     }
@@ -119,17 +114,19 @@ impl Case<'_> {
         ranked.sort_by_key(|costs| costs.instructions_max);
         let least = ranked.first()?;
         Some(Need {
-            format,
-            builds: ranked.iter().map(|costs| costs.build.clone()).collect(),
+            candidate: Candidate {
+                format,
+                builds: ranked.iter().map(|costs| costs.build.clone()).collect(),
+                takes: least.instructions_max as f64 / self.cycles,
+            },
             instructions: least.instructions_max,
-            a_cycle: least.instructions_max as f64 / self.cycles,
         })
     }
 
     fn beyond(&self, need: &Need) -> Beyond {
         match self.target.most_per_cycle {
-            Some(most) if need.a_cycle > FOLDED * f64::from(most) => Beyond::All,
-            Some(_) if need.a_cycle > FOLDED => Beyond::One,
+            Some(most) if need.a_cycle() > FOLDED * f64::from(most) => Beyond::All,
+            Some(_) if need.a_cycle() > FOLDED => Beyond::One,
             _ => Beyond::None,
         }
     }
@@ -160,8 +157,8 @@ impl Case<'_> {
         let is_many = format!(
             "{} instructions in the shortest build, {}, are {:.2} for each of {} cycles at {}",
             grouped(own.instructions),
-            own.build(),
-            own.a_cycle,
+            own.candidate.build(),
+            own.a_cycle(),
             grouped(self.cycles as u64),
             self.clock
         );
@@ -187,8 +184,8 @@ impl Case<'_> {
                  cycle or more, with its wait states",
                 self.cycles_alone(),
                 grouped(own.instructions),
-                own.build(),
-                own.a_cycle
+                own.candidate.build(),
+                own.a_cycle()
             ),
         }
     }
@@ -203,20 +200,19 @@ impl Case<'_> {
 
     /// What comes down to one instruction a cycle, by the instructions alone.
     fn advice(&self, own: &Need, rest: &[Need]) -> Vec<String> {
-        if let Some(need) = rest.iter().find(|need| need.a_cycle <= 1.0) {
+        if let Some(need) = rest.iter().find(|need| need.a_cycle() <= 1.0) {
             return vec![format!(
                 "  = hint: --format {} needs {:.2} instructions a cycle with {}, and the board decides{}",
-                need.format.name(),
-                need.a_cycle,
-                need.build(),
-                what_it_changes(self.policy, need.format)
+                need.candidate.format.name(),
+                need.a_cycle(),
+                need.candidate.build(),
+                what_it_changes(self.policy, need.candidate.format)
             )];
         }
         let all = || std::iter::once(own).chain(rest);
-        let least = all().map(|need| need.a_cycle).fold(f64::INFINITY, f64::min);
-        let nearest = all().find(|need| need.a_cycle <= ALIKE * least).unwrap_or(own);
-        let Need { format, a_cycle, .. } = nearest;
-        let build = nearest.build();
+        let least = all().map(|need| need.a_cycle()).fold(f64::INFINITY, f64::min);
+        let nearest = all().find(|need| need.a_cycle() <= ALIKE * least).unwrap_or(own);
+        let (format, a_cycle, build) = (nearest.candidate.format, nearest.a_cycle(), nearest.candidate.build());
         let mut lines: Vec<String> = self.whole_period(all()).into_iter().collect();
         lines.push(format!(
             "  = hint: no numeric format comes down to one instruction a cycle; next to it comes {} with {build}, {a_cycle:.2}: one \
@@ -224,20 +220,20 @@ impl Case<'_> {
             format.name(),
             (1e6 * self.policy.sample_period * a_cycle).ceil(),
             (1e-6 * self.clock.hz * a_cycle).ceil(),
-            what_it_changes(self.policy, *format)
+            what_it_changes(self.policy, format)
         ));
         let bench = Bench {
             target: self.target,
             outputs: self.outputs,
             clock: self.clock,
         };
-        if let Some((a_cycle, _)) = bench.with_relu(&self.policy.clone().with_format(*format), build) {
+        if let Some((a_cycle, _)) = bench.with_relu(&self.policy.clone().with_format(format), build) {
             lines.push(format!(
                 "  = hint: trained with relu the same network needs {a_cycle:.2} in {} with {build}",
                 format.name()
             ));
         }
-        let candidates: Vec<Candidate> = all().map(Need::candidate).collect();
+        let candidates: Vec<Candidate> = all().map(|need| need.candidate.clone()).collect();
         match bench.widest(self.policy, &candidates) {
             Widest::Fits(Fitting {
                 sizes,
@@ -269,13 +265,13 @@ impl Case<'_> {
         let Slot::Behind(part) = self.clock.slot else {
             return None;
         };
-        let fits = all.find(|need| part * need.a_cycle <= 1.0)?;
+        let fits = all.find(|need| part * need.a_cycle() <= 1.0)?;
         Some(format!(
             "{}: {} with {} needs {:.2} instructions a cycle then",
             trained_for_the_whole(self.policy),
-            fits.format.name(),
-            fits.build(),
-            part * fits.a_cycle
+            fits.candidate.format.name(),
+            fits.candidate.build(),
+            part * fits.a_cycle()
         ))
     }
 

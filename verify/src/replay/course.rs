@@ -8,6 +8,10 @@ use super::duties::{self, Logged};
 use super::explain::Course;
 use super::log::{Done, Log};
 
+/// What a logged duty may lie beyond a limit, as a share of it: eight units of the last place of binary32, which a duty worked out from a
+/// scaled feature may be off by.
+const ROUNDED: f64 = 1e-6;
+
 /// The interpreter over all rows, with the trainer's duties behind each.
 pub(super) fn course<T: Real>(policy: &Policy, log: &Log) -> Result<Course, Faults> {
     let mut controller = Controller::<T>::new(policy);
@@ -29,7 +33,7 @@ pub(super) fn course<T: Real>(policy: &Policy, log: &Log) -> Result<Course, Faul
         for (output, before) in before.iter().enumerate() {
             if let Some(duty) = before.get(row).copied().flatten() {
                 let mut own = state.output(output);
-                own.previous_duty = T::nearest(duty);
+                own.previous_duty = commanded(&controller, output, T::nearest(duty));
                 state.set_output(output, own);
             }
         }
@@ -56,13 +60,38 @@ pub(super) fn course<T: Real>(policy: &Policy, log: &Log) -> Result<Course, Faul
     Ok(course)
 }
 
+/// A logged duty as the controller has it: a trainer that clips in binary32 ends half a unit of the last place beyond a limit that the
+/// controller rounds inwards.
+fn commanded<T: Real>(controller: &Controller<T>, output: usize, duty: T) -> T {
+    let Some((low, high)) = controller.duty_before(output) else {
+        return duty;
+    };
+    let is_rounded = |end: T| (duty.to_f64() - end.to_f64()).abs() <= ROUNDED * end.to_f64().abs();
+    match (duty < low, duty > high) {
+        (true, _) if is_rounded(low) => low,
+        (_, true) if is_rounded(high) => high,
+        _ => duty,
+    }
+}
+
 fn no_duty<T: Real>(controller: &Controller<T>) -> Message {
     let state = controller.state();
-    let before = (0..state.outputs()).map(|output| state.output(output).previous_duty.to_f64().to_string());
-    let before: Vec<String> = before.collect();
-    Message::new("the duty before this row is none that the contract's actions command")
-        .found(before.join(", "))
-        .expected("one between the smallest and the largest of [actions] duties, initial_duty and the fallback's")
+    let outputs = 0..state.outputs();
+    let before = outputs
+        .clone()
+        .map(|output| state.output(output).previous_duty.to_f64());
+    let ends = outputs.filter_map(|output| controller.duty_before(output));
+    let ends = ends.map(|(low, high)| format!("{} to {}", low.to_f64(), high.to_f64()));
+    Message::new("the duty before this row is none that the controller commands")
+        .found(listed(before.map(|duty| duty.to_string())))
+        .expected(format!(
+            "{}: what the actions give within [limits], initial_duty and the fallback's",
+            listed(ends)
+        ))
+}
+
+fn listed(words: impl Iterator<Item = String>) -> String {
+    words.collect::<Vec<_>>().join(", ")
 }
 
 /// Puts what the trainer applied to an output in the place of the controller's own command.

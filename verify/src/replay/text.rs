@@ -100,10 +100,11 @@ fn words(policy: &Policy, replay: &Replay) -> Vec<String> {
     if replay.uncounted > 0 {
         words.push(format!(
             "{} of {} do not count in what {} changes: a signal is outside its range there, or an observation is none that a plausible \
-             measurement gives, and the controller never computes that decision",
+             measurement gives, and the controller never computes that decision{}",
             grouped(replay.uncounted as u64),
             counted(replay.rows, "row"),
-            policy.numeric_format.name()
+            policy.numeric_format.name(),
+            if replay.format.is_none() { "; this log says nothing of it" } else { "" }
         ));
     }
     for (signal, rows, [low, high]) in &replay.outside {

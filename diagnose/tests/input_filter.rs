@@ -1,0 +1,166 @@
+//! A bench supply on leads behind which stands an input capacitor: with and without inductance of the leads, whatever the file says of it.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod bench;
+
+use bench::{Noise, Table};
+use diagnose::diagnosis::{Diagnosis, diagnose_knowing};
+use diagnose::findings::Verdict;
+use plant::Parameters;
+
+const V_IN: f64 = 18.0;
+const L: f64 = 4.7e-6;
+const C: f64 = 220e-6;
+const R: f64 = 0.02;
+const ESR: f64 = 0.007;
+const PERIOD: f64 = 1.0 / 300e3;
+const ROWS: usize = 700;
+/// Steps of Runge and Kutta's method while the switch is on, and while it is off.
+const FINE: [usize; 2] = [12, 20];
+
+const MODEL: &str = "[converter]\nv_in = 18.0\ninductance = 4.7e-6\ncapacitance = 220e-6\nf_sw = 300e3\nrectifier = \"synchronous\"\n\
+                     [inductor]\ndcr = 0.02\n[capacitor]\nesr = 0.007\n[pwm]\nsampling_phase = 0.0\n";
+
+/// Leads and capacitor in front of the switch.
+#[derive(Clone, Copy)]
+struct Leads {
+    resistance: f64,
+    inductance: f64,
+    c_in: f64,
+    esr_in: f64,
+}
+
+const SHORT: Leads = Leads {
+    resistance: 0.07,
+    inductance: 0.0,
+    c_in: 39e-6,
+    esr_in: 0.005,
+};
+const LONG: Leads = Leads {
+    resistance: 0.06,
+    inductance: 0.9e-6,
+    c_in: 68e-6,
+    esr_in: 0.012,
+};
+
+/// Inductor current, output capacitor, input capacitor, current of the leads.
+type X = [f64; 4];
+
+fn slope(x: X, leads: Leads, is_on: bool, load: f64) -> X {
+    let drawn = if is_on { x[0] } else { 0.0 };
+    let (input, lead) = match leads.inductance > 0.0 {
+        true => (x[2] + leads.esr_in * (x[3] - drawn), x[3]),
+        // (V_IN - v) / R = (v - v_c) / esr + drawn
+        false => {
+            let v =
+                (V_IN / leads.resistance + x[2] / leads.esr_in - drawn) / (1.0 / leads.resistance + 1.0 / leads.esr_in);
+            (v, (V_IN - v) / leads.resistance)
+        }
+    };
+    let out = x[1] + ESR * (x[0] - load);
+    [
+        (if is_on { input } else { 0.0 } - R * x[0] - out) / L,
+        (x[0] - load) / C,
+        (lead - drawn) / leads.c_in,
+        match leads.inductance > 0.0 {
+            true => (V_IN - leads.resistance * x[3] - input) / leads.inductance,
+            false => 0.0,
+        },
+    ]
+}
+
+fn stretch(x: &mut X, leads: Leads, is_on: bool, share: f64, load: f64) {
+    let steps = FINE[usize::from(!is_on)];
+    let h = share * PERIOD / steps as f64;
+    let moved = |x: X, by: f64, k: X| -> X { std::array::from_fn(|n| x[n] + by * k[n]) };
+    for _ in 0..steps {
+        let a = slope(*x, leads, is_on, load);
+        let b = slope(moved(*x, 0.5 * h, a), leads, is_on, load);
+        let c = slope(moved(*x, 0.5 * h, b), leads, is_on, load);
+        let d = slope(moved(*x, h, c), leads, is_on, load);
+        for n in 0..4 {
+            x[n] += h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]);
+        }
+    }
+}
+
+/// From each row on: duty and current of an electronic load.
+fn record(leads: Leads, course: &[(usize, f64, f64)], seed: u64) -> Table {
+    let (mut x, mut random) = ([course[0].2, 5.0, V_IN, 1.0], Noise(seed));
+    let mut columns = ["t", "duty", "v_out", "i_l", "i_out"].map(|name| (name.to_owned(), Vec::new()));
+    for row in -2500..ROWS as isize {
+        let of_row = course.iter().rev().find(|(from, ..)| *from as isize <= row.max(0));
+        let (_, duty, load) = *of_row.unwrap();
+        if row >= 0 {
+            let values = [
+                row as f64 * PERIOD,
+                duty,
+                x[1] + ESR * (x[0] - load) + 2e-3 * random.normal(),
+                x[0] + 0.015 * random.normal(),
+                load + 0.015 * random.normal(),
+            ];
+            for (column, value) in columns.iter_mut().zip(values) {
+                column.1.push(value);
+            }
+        }
+        stretch(&mut x, leads, true, duty, load);
+        stretch(&mut x, leads, false, 1.0 - duty, load);
+    }
+    Table(columns.to_vec())
+}
+
+fn found(leads: Leads, certain: &[&str], seed: u64) -> Diagnosis {
+    let model = Parameters::from_toml("plant.toml".as_ref(), MODEL).unwrap();
+    let courses: [&[(usize, f64, f64)]; 2] = [
+        &[(0, 0.29, 2.0), (170, 0.29, 9.0), (350, 0.29, 5.0), (520, 0.29, 12.0)],
+        &[(0, 0.29, 7.0), (170, 0.31, 7.0), (350, 0.275, 7.0), (520, 0.30, 7.0)],
+    ];
+    let read = |n: usize| {
+        let table = record(leads, courses[n], seed + n as u64);
+        table.read(["load", "duty"][n], &model).unwrap()
+    };
+    let certain: Vec<String> = certain.iter().map(|key| (*key).to_owned()).collect();
+    diagnose_knowing(&model, &certain, vec![read(0), read(1)], &[], &|_| ())
+}
+
+/// Values of the leads that lie outside of their interval, of those that the answer has.
+fn missed(leads: Leads, certain: &[&str], seed: u64) -> (usize, usize) {
+    let findings = found(leads, certain, seed).findings;
+    let names: Vec<&str> = findings.causes.iter().map(|cause| cause.id).collect();
+    assert_eq!(
+        (findings.verdict, &names[..]),
+        (Verdict::Explained, &["source_impedance"][..]),
+        "{}",
+        findings.sentence
+    );
+    let truth = [
+        ("resistance", leads.resistance),
+        ("inductance", leads.inductance),
+        ("c_in", leads.c_in),
+        ("esr_in", leads.esr_in),
+    ];
+    let parameters = &findings.causes[0].parameters;
+    let held = truth
+        .iter()
+        .filter_map(|(name, value)| Some((parameters.get(*name)?, *value)));
+    let missed: Vec<bool> = held
+        .map(|(found, value)| value < found.low || value > found.high)
+        .collect();
+    println!("{}", findings.sentence);
+    (missed.iter().filter(|missed| **missed).count(), missed.len())
+}
+
+#[test]
+fn the_values_of_an_input_filter_lie_in_their_intervals_with_and_without_inductance() {
+    let runs = [
+        missed(SHORT, &[], 5),
+        missed(SHORT, &[], 105),
+        missed(SHORT, &["source.inductance"], 205),
+        missed(LONG, &[], 305),
+        missed(LONG, &[], 405),
+    ];
+    let (out, all) = runs.iter().fold((0, 0), |sum, run| (sum.0 + run.0, sum.1 + run.1));
+    // 95 % of seventeen leave one out in six runs of ten, and more than two in one of twenty
+    assert!(all >= 17 && out <= 2, "{runs:?}");
+}

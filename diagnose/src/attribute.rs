@@ -115,10 +115,15 @@ pub fn without_search(problem: Problem, null: State) -> (Problem, Attribution) {
 }
 
 /// The causes that may be: those that change nothing of what is certain, and no load or meter that no record has. Those could do nothing but
-/// change the integration.
+/// change the integration. Nor forms that settled points cannot tell from simpler ones.
 fn sought(problem: &Problem) -> Vec<Candidate> {
     let mut list = candidates(&problem.base, &problem.bases);
-    list.retain(|candidate| is_there(problem, candidate) && !candidate.changes(&problem.base.certain));
+    let has_a_course = problem.records.iter().any(|record| !record.settled);
+    list.retain(|candidate| {
+        is_there(problem, candidate)
+            && !candidate.changes(&problem.base.certain)
+            && (has_a_course || !candidate.form.is_of_a_course)
+    });
     list
 }
 

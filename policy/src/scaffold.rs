@@ -353,6 +353,7 @@ sample_period = \"TODO\"       # s: control period
 
 # What the firmware measures, one row each: { name = \"v_out\", unit = \"V\", range = [0.0, 250.0] }. A sample outside of its range is
 # no plausible one, and the last good one is held. With adc = { gain = 0.0625, offset = 0.0 } it arrives as an ADC code.
+# The names are yours; `simulate` closes the loop with those that it knows: v_out, i_l, i_out, v_in.
 signal = [
   { name = \"TODO\", unit = \"TODO\", range = [\"TODO\", \"TODO\"] },
 ]

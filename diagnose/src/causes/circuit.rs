@@ -143,7 +143,8 @@ pub(super) const L_SATURATION: Cause = Cause {
                 knob("steepness", &["inductor.steepness"], Reach::Plain(0.5, 2.0, 0.1)),
             ],
             Search::From(&[&[9.5, 15.0, 8.0], &[9.5, 25.0, 8.0], &[9.5, 12.0, 14.0]]),
-        ),
+        )
+        .of_a_course(),
         searched(
             "inductance that falls steeply with current",
             &[

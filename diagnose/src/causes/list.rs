@@ -51,7 +51,12 @@ pub(super) const fn form(words: &'static str, knobs: &'static [Knob]) -> Form {
 }
 
 pub(super) const fn searched(words: &'static str, knobs: &'static [Knob], search: Search) -> Form {
-    Form { words, knobs, search }
+    Form {
+        words,
+        knobs,
+        search,
+        is_of_a_course: false,
+    }
 }
 
 // in units of the converter's own size: absolute bounds would suit one converter only (docs/recipes/cause.md)

@@ -98,9 +98,19 @@ pub struct Form {
     pub knobs: &'static [Knob],
     /// How to fit it.
     pub search: Search,
+    /// It differs from a simpler form by how it moves in time: settled points have no use for it.
+    pub is_of_a_course: bool,
 }
 
 impl Form {
+    /// The form, where only records with a course tell it from a simpler one.
+    pub(crate) const fn of_a_course(self) -> Self {
+        Form {
+            is_of_a_course: true,
+            ..self
+        }
+    }
+
     /// Whether the model's own value is a place to fit from, and to look from at first order.
     #[must_use]
     pub fn begins_at_own(&self) -> bool {

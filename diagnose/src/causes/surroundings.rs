@@ -38,7 +38,8 @@ pub(super) const SOURCE_IMPEDANCE: Cause = Cause {
                 knob("esr_in", &["source.esr_in"], OHMS),
             ],
             Search::From(&[&[4.0, 3.0, 1.0], &[4.0, 20.0, 1.0]]),
-        ),
+        )
+        .of_a_course(),
         searched(
             "resistance and inductance of the source before an input capacitor",
             &[

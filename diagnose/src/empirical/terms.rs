@@ -34,6 +34,7 @@ macro_rules! terms {
                 words: $words,
                 knobs: &[Knob::plain($name, &[concat!("empirical.", $name)], [-MOST, MOST, STEP])],
                 search: Search::Own,
+                is_of_a_course: false,
             },
             of: &[$(Of::$of),*],
         }),+];

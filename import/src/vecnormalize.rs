@@ -19,6 +19,10 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Vec<DraftFeature>, Message> {
     if bytes.starts_with(b"\x93NUMPY") {
         return Err(other_file("an array of numpy (.npy)"));
     }
+    // a pickle begins with a byte that no text has, or ends with the mark of its first protocol, a full stop
+    if std::str::from_utf8(bytes).is_ok() && !bytes.ends_with(b".") {
+        return Err(other_file("a text, such as JSON"));
+    }
     let pickle = Pickle::read(bytes)?;
     match pickle.item(pickle.root) {
         Item::Object(object) if object.class == CLASS => {}

@@ -403,7 +403,12 @@ fn golden_answers_of_another_network_are_refused_with_the_way_out() {
 fn statistics_in_a_file_of_numpy_are_refused_with_the_formula() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::copy(fixture("sb3_ppo.zip"), folder.path().join("model.zip")).unwrap();
-    for (start, kind) in [(&b"PK\x03\x04rest"[..], ".npz"), (b"\x93NUMPY\x01\x00", ".npy")] {
+    let json = &br#"{"obs_mean": [0.1], "obs_var": [0.2]}"#[..];
+    for (start, kind) in [
+        (&b"PK\x03\x04rest"[..], ".npz"),
+        (b"\x93NUMPY\x01\x00", ".npy"),
+        (json, "JSON"),
+    ] {
         std::fs::write(folder.path().join("vecnormalize.pkl"), start).unwrap();
         let faults = refusal(&folder.path().join("model.zip"));
         for words in [

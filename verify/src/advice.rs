@@ -135,7 +135,7 @@ fn too_slow(policy: &Policy, bench: Bench<'_>, nearest: &Proposal, all: &[&Propo
     let (format, build) = (candidate.format, candidate.build());
     let mut lines = vec![format!(
         "  = hint: no numeric format {}; next to it comes {} with {build}, {} %: it fills a period of {:.0} us, or the \
-         present one at {:.0} MHz{}",
+         present one at {:.0} MHz, where the part can run at it{}",
         if share.0 <= 1.0 { "surely fits" } else { "fits" },
         format.name(),
         percents(*share),

@@ -216,7 +216,7 @@ impl Case<'_> {
         let mut lines: Vec<String> = self.whole_period(all()).into_iter().collect();
         lines.push(format!(
             "  = hint: no numeric format comes down to one instruction a cycle; next to it comes {} with {build}, {a_cycle:.2}: one \
-             instruction a cycle fills a period of {:.0} us, or the present one at {:.0} MHz{}",
+             instruction a cycle fills a period of {:.0} us, or the present one at {:.0} MHz, where the part can run at it{}",
             format.name(),
             (1e6 * self.policy.sample_period * a_cycle).ceil(),
             (1e-6 * self.clock.hz * a_cycle).ceil(),

@@ -127,6 +127,14 @@ mod tests {
         (0..=last.to_bits()).step_by(1009).map(f32::from_bits).chain([last])
     }
 
+    /// A slope has 15 bits behind the point (section 6b): one that would round to 1 is the largest of them.
+    #[test]
+    fn the_steepest_slope_in_integers_is_one_unit_below_one() {
+        let behind = |slope: f64| integer(Activation::LeakyRelu { slope }, -32_768, (0, 0), 0);
+        assert_eq!(behind(0.999_999), -32_767);
+        assert_eq!(behind(0.5), -16_384);
+    }
+
     /// What bounds and certificates take for granted, against the arithmetic of the contract.
     #[test]
     fn the_facts_of_each_activation_hold_for_the_contracts_arithmetic() {

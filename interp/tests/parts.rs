@@ -175,6 +175,49 @@ fn answers_of_the_trainer_are_compared_row_by_row() {
     assert!(refusal(&integer).is_some());
 }
 
+/// The trainer's network is one of tanh, and the contract says relu.
+#[test]
+fn an_activation_that_gives_every_golden_answer_is_the_hint() {
+    let contract = format!(
+        "name = \"deep\"\nsample_period = 0.25\n[[signal]]\nname = \"u\"\nrange = [-4.0, 4.0]\n[[feature]]\nname = \"x\"\nsource = \"u\"\n\
+         [network]\nweights = \"weights.safetensors\"\nhidden_activation = \"relu\"\n[actions]\nduties = [0.25, 0.75]\n{PLAIN}"
+    );
+    let layer = |outputs, weights, bias| Dense {
+        inputs: 1,
+        outputs,
+        weights,
+        bias,
+    };
+    let layers = [layer(1, &[1.0][..], &[0.5][..]), layer(2, &[2.0, -1.0], &[0.0, 0.25])];
+    let mut policy = load(&contract, &[], &layers);
+    let observations = vec![-2.0, -0.5, 0.75, 3.0];
+    let q = observations.iter().flat_map(|x: &f32| {
+        let y = (f64::from(*x) + 0.5).tanh();
+        [2.0 * y, 0.25 - y]
+    });
+    policy.golden = Some(Golden {
+        count: 4,
+        outside: 0,
+        q_values: q.map(|q| q as f32).collect(),
+        observations,
+        action_indices: Vec::new(),
+        duties: Vec::new(),
+        law: Vec::new(),
+        outputs: Vec::new(),
+        tolerance: 1e-5,
+        decisions: None,
+        duty_error: None,
+    });
+    let result = golden_result(&policy).unwrap();
+    assert!(!result.passed());
+    assert_eq!(result.activations, ["\"tanh\""]);
+    assert!(
+        result.hint().contains("hidden_activation = \"tanh\""),
+        "{}",
+        result.hint()
+    );
+}
+
 /// The law is `u / 16`, the network adds a quarter of the duty to it where u is above 5.
 fn residual(dead_zone: &str) -> Controller<f32> {
     let contract = format!(

@@ -6,8 +6,9 @@
 mod common;
 
 use common::{Dense, PLAIN, load};
+use interp::decisions::{Decisions, decisions};
 use interp::{Controller, Sample, Trace};
-use policy::Policy;
+use policy::{Golden, Policy};
 
 /// A controller of `u` (0..10) and `i` (-5..5) whose network gives these outputs whatever it sees. Feature `f` is the integral of
 /// u, scaled by 0.5 and clipped; feature `g` is i.
@@ -137,4 +138,42 @@ fn nothing_can_be_chosen_and_gains_are_given_for_outputs() {
         None,
         "one output is missing"
     );
+}
+
+/// The second gain of the second row is off by a quarter of an output, an eighth of its range from -0.5 to 0.5.
+#[test]
+fn gains_in_a_format_are_held_against_those_of_the_trainers_outputs() {
+    let actions =
+        "base = \"0.25\"\ngains = [{ source = \"u\", clip = [-1, 1], scale = 0.125 }, { clip = [-1, 1], scale = 0.5 }]";
+    let mut policy = policy(&[0.5, 0.125], actions);
+    policy.golden = Some(Golden {
+        count: 2,
+        outside: 0,
+        observations: vec![0.25, 1.0, -0.5, 2.0],
+        q_values: vec![0.5, 0.125, 0.5, 0.375],
+        action_indices: Vec::new(),
+        duties: Vec::new(),
+        law: Vec::new(),
+        outputs: Vec::new(),
+        tolerance: 1e-4,
+        decisions: None,
+        duty_error: None,
+    });
+    let Some(Decisions::Schedule(found)) = decisions(&policy, None) else {
+        panic!("no schedule");
+    };
+    assert_eq!((found.observations, found.largest, found.mean), (2, 0.125, 0.0625));
+    assert!(!found.kept());
+    let worst = found.worst.unwrap();
+    assert_eq!((worst.row, worst.gain, worst.range), (1, 1, 1.0));
+    assert_eq!((worst.expected, worst.found), (0.1875, 0.0625));
+    assert_eq!(worst.observation, [-0.5, 2.0]);
+    // without outputs binary64 stands for them, which these numbers are exact in
+    if let Some(golden) = &mut policy.golden {
+        golden.q_values.clear();
+    }
+    let Some(Decisions::Schedule(found)) = decisions(&policy, None) else {
+        panic!("no schedule");
+    };
+    assert_eq!((found.observations, found.largest), (2, 0.0));
 }

@@ -93,6 +93,10 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
     let mut profiles = held_by_data(&problem, &mut attribution, &structure, say);
     // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
+    if !nothing.is_empty() {
+        // the others were fitted without it: their values and intervals are others
+        profiles = intervals(&problem, &mut attribution, &structure, say);
+    }
     let named = named(&attribution, &profiles);
     let mut doubts = doubts::of(&problem, &attribution, &profiles, &structure);
     if !structure.is_empty() || doubts::forbids(&named, &doubts) {
@@ -199,12 +203,14 @@ impl Examined {
 
     /// What the fit and its profiles say.
     fn answer(&mut self) {
-        let (problem, attribution) = (&self.problem, &self.attribution);
+        let (problem, attribution) = (&self.problem, &mut self.attribution);
         self.structure = structures(problem, &attribution.null, attribution.state(), attribution.inflation);
         self.lines = beside(
             fast::structures(problem, &attribution.null, attribution.state()),
             &self.structure,
         );
+        self.profiles = intervals(problem, attribution, &self.structure, &|_| ());
+        let attribution = &self.attribution;
         self.named = named(attribution, &self.profiles);
         self.doubts = doubts::of(problem, attribution, &self.profiles, &self.structure);
         let holds = self.structure.is_empty() && !doubts::forbids(&self.named, &self.doubts);
@@ -273,8 +279,22 @@ fn held_by_data(
     for (member, rival) in crate::ties::in_part(problem, attribution, say) {
         attribution.rivals[member].push(rival);
     }
+    intervals(problem, attribution, structure, say)
+}
+
+/// Values of the named causes and what the data allow of each.
+fn intervals(
+    problem: &Problem,
+    attribution: &mut Attribution,
+    structure: &[Structure],
+    say: Listener<'_>,
+) -> Vec<Profile> {
+    if !structure.is_empty() {
+        return parabolas(problem, attribution);
+    }
     let mut profiles = profiles(problem, attribution, say);
     rivals::widen(attribution, &mut profiles);
+    rivals::widen_by_edges(problem, attribution, &mut profiles);
     profiles
 }
 

@@ -154,6 +154,37 @@ fn without<T: Clone>(list: &[T], member: usize) -> Vec<T> {
     kept
 }
 
+/// Widens the intervals of causes that move the gate's edges by what stands beside every fit for the edges: of on-time that is lost or won,
+/// nobody knows which part is whose. Only away from the model's own value, for what the trim takes back is less of the cause and not another.
+pub fn widen_by_edges(problem: &Problem, attribution: &Attribution, profiles: &mut [Profile]) {
+    let Some(best) = &attribution.best else { return };
+    let converter = &problem.base.plant.converter;
+    let late = best.state.starts.trim_or_none(converter.f_sw) * problem.bases.t_sw;
+    for profile in profiles.iter_mut() {
+        let Some(candidate) = best
+            .causes
+            .get(profile.member)
+            .map(|cause| &attribution.candidates[*cause])
+        else {
+            continue;
+        };
+        let knobs = candidate.form.knobs.iter().zip(&candidate.ranges);
+        for (knob, [low, high, _]) in knobs.filter(|(knob, _)| knob.name == profile.name) {
+            // what ends a pulse late makes it longer; dead time, and what begins it late, shorter
+            let by = match knob.keys {
+                ["switch.turn_off_delay"] => late,
+                ["switch.turn_on_delay" | "switch.dead_time"] => -late,
+                _ => continue,
+            };
+            let [below, above] = &mut profile.interval;
+            match profile.value > profile.own {
+                true => *above = (*above + by.max(0.0)).min(*high),
+                false => *below = (*below + by.min(0.0)).max(*low),
+            }
+        }
+    }
+}
+
 /// Widens the interval of each parameter to the union over the explanations that have it: which of them is true, nobody knows.
 pub fn widen(attribution: &Attribution, profiles: &mut [Profile]) {
     let Some(best) = &attribution.best else { return };

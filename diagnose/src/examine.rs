@@ -279,6 +279,7 @@ fn held_by_data(
     for (member, rival) in crate::ties::in_part(problem, attribution, say) {
         attribution.rivals[member].push(rival);
     }
+    rivals::leave_out_cut_off(attribution);
     intervals(problem, attribution, structure, say)
 }
 

@@ -154,6 +154,24 @@ fn without<T: Clone>(list: &[T], member: usize) -> Vec<T> {
     kept
 }
 
+/// Takes out what ends where it is cut off: a steep fall of the inductance below every current is another inductance, and no explanation of
+/// its own.
+pub fn leave_out_cut_off(attribution: &mut Attribution) {
+    let candidates = &attribution.candidates;
+    let is_cut_off = |fit: &Fit| {
+        let mut rest = &fit.values[..];
+        fit.causes.iter().any(|cause| {
+            let candidate = &candidates[*cause];
+            let (own, others) = rest.split_at(candidate.own.len().min(rest.len()));
+            rest = others;
+            doubts::is_at_bound(candidate, own)
+        })
+    };
+    for rivals in &mut attribution.rivals {
+        rivals.retain(|fit| !is_cut_off(fit));
+    }
+}
+
 /// Widens the intervals of causes that move the gate's edges by what stands beside every fit for the edges: of on-time that is lost or won,
 /// nobody knows which part is whose. Only away from the model's own value, for what the trim takes back is less of the cause and not another.
 pub fn widen_by_edges(problem: &Problem, attribution: &Attribution, profiles: &mut [Profile]) {

@@ -12,6 +12,7 @@ use crate::parallel;
 use crate::problem::{Problem, dot};
 use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
+use crate::record::Record;
 use crate::search::{Known, Searcher, TIE, gained};
 use crate::shape::structures;
 use crate::small;
@@ -118,7 +119,9 @@ pub fn without_search(problem: Problem, null: State) -> (Problem, Attribution) {
 /// change the integration. Nor forms that settled points cannot tell from simpler ones.
 fn sought(problem: &Problem) -> Vec<Candidate> {
     let mut list = candidates(&problem.base, &problem.bases);
-    let has_a_course = problem.records.iter().any(|record| !record.settled);
+    // a capture is a settled point that shows its period
+    let shows = |record: &Record| !record.settled || record.capture.is_some();
+    let has_a_course = problem.records.iter().any(shows);
     list.retain(|candidate| {
         is_there(problem, candidate)
             && !candidate.changes(&problem.base.certain)

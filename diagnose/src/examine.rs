@@ -267,7 +267,7 @@ fn held_by_data(
     say: Listener<'_>,
 ) -> Vec<Profile> {
     if !structure.is_empty() {
-        return parabolas(problem, attribution);
+        return intervals(problem, attribution, structure, say);
     }
     let mut others = crate::ties::other_pairs(problem, attribution, say);
     others.extend(crate::ties::pairs_for_one(problem, attribution, say));

@@ -35,12 +35,12 @@ fn is_cut_off([low, high]: [f64; 2], is_size: bool, value: f64) -> bool {
 /// The values that are tried of parameter number `place`; nothing where they have no end: whole periods and counts have no range, and a
 /// phase comes round again.
 fn tried(candidate: &Candidate, place: usize) -> Option<[f64; 2]> {
-    let name = candidate.form.knobs.get(place)?.name;
-    let is_round = candidate.form.search == Search::Line && name == "phase";
+    let knob = candidate.form.knobs.get(place)?;
+    let is_round = candidate.form.search == Search::Line && knob.name == "phase";
     let [low, mut high, _] = *candidate.ranges.get(place)?;
-    // a core that loses all of its inductance is that of a data sheet, not one that would lose more
-    if name == "saturation" {
-        high = 2.0;
+    // a part that loses all along its curve is that of a data sheet, not one that would lose more
+    if knob.is_share() {
+        high *= 2.0;
     }
     (candidate.form.is_smooth() && !is_round).then_some([low, high])
 }

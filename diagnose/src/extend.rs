@@ -205,11 +205,9 @@ fn without_head(text: &str) -> &str {
 /// What is said of each number that has changed: its unit, its interval, and what it was.
 fn notes(diagnosis: &Diagnosis, after: &Parameters, trim: f64) -> BTreeMap<&'static str, String> {
     let mut intervals: BTreeMap<&str, String> = BTreeMap::new();
-    let best = diagnosis
-        .attribution
-        .best
-        .iter()
-        .flat_map(|fit| fit.causes.iter().enumerate());
+    // what a fit tells in a model that is wrong is no interval of the converter
+    let is_right = diagnosis.findings.verdict != Verdict::Unexplained;
+    let best = (diagnosis.attribution.best.iter().filter(|_| is_right)).flat_map(|fit| fit.causes.iter().enumerate());
     for (member, cause) in best {
         for (knob, profile) in diagnosis.attribution.candidates[*cause]
             .form

@@ -105,9 +105,8 @@ pub fn advice(findings: &Findings) -> Option<String> {
         false => "",
     };
     let key = |id: &&str| {
-        CAUSES.iter().find(|cause| cause.id == *id)?.forms[0].knobs[0]
-            .keys
-            .first()
+        let cause = CAUSES.iter().find(|cause| cause.id == *id)?;
+        cause.forms[0].knobs[0].known_as().first()
     };
     let keys: Vec<String> = ids
         .iter()

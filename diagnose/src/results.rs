@@ -10,6 +10,7 @@ use toml_input::{Faults, Message};
 
 use crate::capture::estimates::Estimates;
 use crate::diagnosis::Diagnosis;
+use crate::empirical::Empirical;
 use crate::extend::{extended_toml, partial_toml};
 use crate::findings::Findings;
 use crate::gain::Regime;
@@ -17,6 +18,8 @@ use crate::next;
 use crate::page::comparison::{Compared, compared};
 use crate::page::page;
 use crate::played;
+use crate::words::si;
+use crate::worth::Worth;
 
 /// `diagnosis.json`.
 #[derive(Serialize)]
@@ -128,6 +131,20 @@ fn told(error: impl ToString) -> Message {
     Message::new(error.to_string())
 }
 
+/// Where the causes that come nearest leave far less of a held-out record than the description does, and which file has them.
+fn nearer(term: &Empirical, partial: &[Worth]) -> Option<String> {
+    let described = term.errors.iter().find(|worth| worth.heldout && term.written)?;
+    let is_it =
+        |worth: &&Worth| worth.heldout && (&worth.record, worth.channel) == (&described.record, described.channel);
+    let causes = partial.iter().find(is_it)?;
+    (causes.rmse_after < 0.5 * described.rmse_after).then(|| {
+        format!(
+            " The causes that come nearest leave {} there: plant.partial.toml has them, for a look and not for training.",
+            si(causes.rmse_after, causes.unit)
+        )
+    })
+}
+
 /// What the command says: the verdict, then what was noticed. `files` are those of the records.
 #[must_use]
 pub fn answer(columns: &ColumnMap, files: &[&Path], findings: &Findings) -> Vec<String> {
@@ -152,7 +169,8 @@ pub fn answer(columns: &ColumnMap, files: &[&Path], findings: &Findings) -> Vec<
     }
     lines.extend(findings.captures.iter().map(Estimates::words));
     if let Some(term) = &findings.empirical {
-        lines.push(format!("described, not explained: {}", term.sentence));
+        let nearer = nearer(term, &findings.partial_gain).unwrap_or_default();
+        lines.push(format!("described, not explained: {}{nearer}", term.sentence));
     }
     lines.extend(next::advice(findings));
     lines.extend(findings.noise.repairs.iter().map(|repair| format!("note: {repair}")));

@@ -281,6 +281,37 @@ pub fn edges(found: &Examined) -> Option<String> {
     })
 }
 
+/// What a part has where the converter works, of each curve that was found or comes nearest: the number that a meter at the bench shows.
+pub fn curves(found: &Examined) -> Vec<String> {
+    let Examined {
+        problem, attribution, ..
+    } = found;
+    let (bases, before, after) = (&problem.bases, &problem.base.plant, &attribution.state().model.plant);
+    let causes = attribution.best.iter().flat_map(|best| &best.causes);
+    let note = |id: &str| {
+        let (part, what, at, values) = match id {
+            "c_derating" => (
+                "output capacitor",
+                "F",
+                si(bases.v, "V"),
+                [before, after].map(|plant| plant.capacitance_at(bases.v)),
+            ),
+            "l_saturation" => (
+                "inductor",
+                "H",
+                si(bases.i, "A"),
+                [before, after].map(|plant| plant.inductance_at(bases.i)),
+            ),
+            _ => return None,
+        };
+        let [before, after] = values.map(|value| si(value, what));
+        Some(format!(
+            "along its curve the {part} has {after} at {at}, where the model as given has {before}"
+        ))
+    };
+    causes.filter_map(|cause| note(attribution.id(*cause))).collect()
+}
+
 /// Said behind the verdict: what no fit to the training records can know.
 pub fn shifted(shifts: &[Shift]) -> String {
     let one = |shift: &Shift| {

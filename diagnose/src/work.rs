@@ -76,7 +76,8 @@ impl Work {
         };
         let of_steps = (plant::steps_per_period(p) / STEPS) as u64;
         let of_record = if record.settled { SETTLED } else { 1 };
-        self.count(record.rows() as u64 * of_plant.max(of_steps) * of_record);
+        let of_row = of_plant.max(of_steps).saturating_mul(of_record);
+        self.count((record.rows() as u64).saturating_mul(of_row));
     }
 
     /// Whether a fit may look at a model: a corner of what its parameters may be can take longer than all the rest. A model that was given

@@ -4,7 +4,7 @@
 
 mod bench;
 
-use bench::{Noise, Table};
+use bench::{Noise, Table, integrate};
 use diagnose::diagnosis::diagnose;
 use diagnose::extend::extended_toml;
 use diagnose::findings::Verdict;
@@ -44,16 +44,7 @@ fn stretch(x: &mut [f64; 2], way: Way, time: f64, load: f64, steps: usize) {
         };
         [(node - 0.018 * i - v - ESR * (i - load)) / L, (i - load) / C]
     };
-    let moved = |x: [f64; 2], by: f64, k: [f64; 2]| [x[0] + by * k[0], x[1] + by * k[1]];
-    for _ in 0..steps {
-        let a = slope(*x);
-        let b = slope(moved(*x, 0.5 * h, a));
-        let c = slope(moved(*x, 0.5 * h, b));
-        let d = slope(moved(*x, h, c));
-        for n in 0..2 {
-            x[n] += h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]);
-        }
-    }
+    integrate(x, h, steps, slope);
 }
 
 /// From each row on: duty and current of an electronic load.

@@ -4,7 +4,7 @@
 
 mod bench;
 
-use bench::{Noise, Table};
+use bench::{Noise, Table, integrate};
 use diagnose::diagnosis::{Diagnosis, diagnose_knowing};
 use diagnose::findings::Verdict;
 use plant::Parameters;
@@ -73,16 +73,7 @@ fn slope(x: X, leads: Leads, is_on: bool, load: f64) -> X {
 fn stretch(x: &mut X, leads: Leads, is_on: bool, share: f64, load: f64) {
     let steps = FINE[usize::from(!is_on)];
     let h = share * PERIOD / steps as f64;
-    let moved = |x: X, by: f64, k: X| -> X { std::array::from_fn(|n| x[n] + by * k[n]) };
-    for _ in 0..steps {
-        let a = slope(*x, leads, is_on, load);
-        let b = slope(moved(*x, 0.5 * h, a), leads, is_on, load);
-        let c = slope(moved(*x, 0.5 * h, b), leads, is_on, load);
-        let d = slope(moved(*x, h, c), leads, is_on, load);
-        for n in 0..4 {
-            x[n] += h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]);
-        }
-    }
+    integrate(x, h, steps, |x| slope(x, leads, is_on, load));
 }
 
 /// From each row on: duty and current of an electronic load.

@@ -4,7 +4,7 @@
 
 mod bench;
 
-use bench::{Noise, Table};
+use bench::{Noise, Table, integrate};
 use diagnose::diagnosis::{Diagnosis, diagnose};
 use diagnose::findings::{Findings, Verdict};
 use plant::Parameters;
@@ -47,16 +47,7 @@ fn stretch(x: &mut [f64; 2], core: Core, is_on: bool, share: f64, load: f64) {
         let out = x[1] + ESR * (x[0] - load);
         [(source - R * x[0] - out) / (L * core(x[0])), (x[0] - load) / C]
     };
-    let moved = |x: [f64; 2], by: f64, k: [f64; 2]| [x[0] + by * k[0], x[1] + by * k[1]];
-    for _ in 0..FINE {
-        let a = slope(*x);
-        let b = slope(moved(*x, 0.5 * h, a));
-        let c = slope(moved(*x, 0.5 * h, b));
-        let d = slope(moved(*x, h, c));
-        for n in 0..2 {
-            x[n] += h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]);
-        }
-    }
+    integrate(x, h, FINE, slope);
 }
 
 /// From each row on: duty and current of an electronic load.

@@ -314,3 +314,23 @@ fn wrong_arguments_are_errors_and_change_nothing() {
     assert_eq!(wrong, InputError::ObservationLength { expected: 1, found: 2 });
     assert_eq!(c.state_words(), before);
 }
+
+/// What a trainer commits step by step is what `step` does: the next one finds the same state.
+#[test]
+fn a_trace_that_is_committed_leaves_the_state_of_a_step() {
+    let mut whole = controller(SOURCE, PLAIN, &[]);
+    let mut parts = whole.clone();
+    let mut trace = parts.blank_trace();
+    for samples in [good(6.0), bad(), far(), good(5.0)] {
+        let command = whole.step(&samples).unwrap().command;
+        parts.eval_into(&samples, &mut trace).unwrap();
+        assert_ne!(
+            parts.state_words(),
+            whole.state_words(),
+            "nothing is kept before it is committed"
+        );
+        parts.commit_trace(&trace);
+        assert_eq!(trace.command, command);
+        assert_eq!(parts.state_words(), whole.state_words());
+    }
+}

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::effects::{derating, saturation};
+
 /// A converter with its modulator, load and sensors. A field that is 0 (a gain that is 1) is an effect that is absent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -75,6 +77,18 @@ impl Parameters {
     #[must_use]
     pub fn t_sw(&self) -> f64 {
         1.0 / self.converter.f_sw
+    }
+
+    /// The differential capacitance of the output at `v` volts, F.
+    #[must_use]
+    pub fn capacitance_at(&self, v: f64) -> f64 {
+        self.converter.capacitance * derating::relative_capacitance(&self.capacitor, v)
+    }
+
+    /// The differential inductance at `i` amperes, H.
+    #[must_use]
+    pub fn inductance_at(&self, i: f64) -> f64 {
+        self.converter.inductance * saturation::relative_inductance(&self.inductor, i)
     }
 }
 

@@ -1,6 +1,6 @@
 //! How short the steps of the full circuit are: a share of its fastest time constant.
 
-use crate::effects::dcr;
+use crate::effects::{dcr, derating};
 use crate::parameters::Parameters;
 use crate::signals::Load;
 
@@ -21,7 +21,7 @@ pub(crate) fn has_c_in(p: &Parameters) -> bool {
 fn rates(p: &Parameters, mut ask: impl FnMut(&'static str, f64, f64)) {
     // the least that saturation and derating can leave, so that the step need not follow current and voltage
     let l = p.converter.inductance * (1.0 - p.inductor.saturation);
-    let c = p.converter.capacitance * (1.0 - p.capacitor.derating);
+    let c = p.converter.capacitance * derating::least(p);
     let r = dcr::in_series(&p.inductor)
         + p.switch.r_ds_on.max(p.switch.r_ds_on_low).max(p.switch.r_d)
         + p.source.resistance;

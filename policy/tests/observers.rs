@@ -246,12 +246,18 @@ fn a_circuit_with_a_voltage_to_hold_has_a_surplus() {
     let range = observer.range(Estimate::Surplus);
     assert_eq!((range.low, range.high), (-load.high, 60.0 - load.low));
     assert_eq!(observer.words(), 3, "the surplus is no state");
+    assert_eq!(observer.estimates().count(), 4);
     assert!(policy.features[0].source.reads(Input::Estimate(0, Estimate::Surplus)));
     let said = policy::describe::observers(&policy);
     for part in ["boost, on in the middle", "model_surplus", "at 400 V"] {
         assert!(said.contains(part), "{said}");
     }
     let plain = folder().policy();
+    assert!(
+        plain.observers[0]
+            .estimates()
+            .all(|estimate| estimate != Estimate::Surplus)
+    );
     let spelled = boosted("topology = \"buck\"\ncarrier = \"trailing\"").policy();
     assert_eq!(
         plain.digests.contract, spelled.digests.contract,

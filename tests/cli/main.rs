@@ -23,6 +23,7 @@ mod plants;
 mod prove;
 mod replay;
 mod replayed_clips;
+mod replayed_columns;
 mod replayed_duties;
 mod replayed_filters;
 mod replayed_formats;

@@ -96,28 +96,6 @@ fn replay_of_a_log_that_the_contract_explains_is_equal_to_the_last_feature() {
     );
 }
 
-/// As arrays are written: an index in brackets is no unit, `ep` is the episode, and a column that may be the choice is asked for.
-#[test]
-fn replay_reads_the_names_that_an_array_gives() {
-    let own = table(&environment()).replacen("episode", "ep", 1);
-    let own = (0..6).fold(own, |text, n| {
-        text.replacen(&format!("obs_{n}"), &format!("obs[{n}]"), 1)
-    });
-    let lines = own.lines().enumerate();
-    let with: Vec<String> = lines
-        .map(|(n, line)| format!("{line},{}", if n == 0 { "a" } else { "0" }))
-        .collect();
-    let desk = desk(&environment());
-    desk.write("log.csv", &(with.join("\n") + "\n"));
-    let ran = desk.type_in("replay buck12 log.csv");
-    assert!(
-        ran.code == Some(0) && ran.stdout.contains("equal: all 6 features") && ran.stdout.contains("2 episodes"),
-        "{}",
-        ran.stdout
-    );
-    assert!(ran.stderr.contains("--map action=a"), "{}", ran.stderr);
-}
-
 #[test]
 fn replay_names_sign_scale_offset_and_clip() {
     let line = said_of(0, "e", |rows, k| -rows[k].observation[0]);
@@ -273,23 +251,6 @@ fn replay_refuses_a_log_that_it_cannot_compare() {
     desk.refuse("replay buck12 log.csv", &["not a control period apart", "1e-4 s"]);
     desk.write("log.csv", "v_out,i_l,i_out,obs_0\n100,2,2,zero\n");
     desk.refuse("replay buck12 log.csv", &["zero"]);
-}
-
-#[test]
-fn a_column_that_looks_like_a_duty_is_proposed_and_compared() {
-    let desk = desk(&environment());
-    let log = desk.read("log.csv");
-    let mut lines = log.lines();
-    let header = format!("{},action,duty_before", lines.next().unwrap());
-    let rows = lines.map(|line| format!("{line},0,0.5"));
-    let text: Vec<String> = [header].into_iter().chain(rows).collect();
-    desk.write("log.csv", &(text.join("\n") + "\n"));
-    let ran = desk.type_in("replay buck12 log.csv --exploring");
-    assert!(ran.stderr.contains("--map previous_duty=duty_before"), "{}", ran.stderr);
-    // action 0 commands .44
-    let ran = desk.type_in("replay buck12 log.csv --exploring --map previous_duty=duty_before");
-    assert_eq!(ran.code, Some(1), "{}", ran.stdout);
-    assert!(ran.stdout.contains("duties"), "{}", ran.stdout);
 }
 
 /// A sensor that ends below what the training reached is no feature that is wrong, and the golden vectors do not stand in the way.

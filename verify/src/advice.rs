@@ -1,5 +1,6 @@
 //! What is said about the budget of a control step, and what to do where it is not met.
 
+mod nearest;
 mod unmodelled;
 
 use codegen::output::languages;
@@ -10,9 +11,10 @@ use targets::TargetSpec;
 
 use crate::budget::{Budget, Clock, Fit, Slot, percents};
 use crate::costs::StepCosts;
-use crate::fitting::{Bench, Candidate, Fitting, Widest};
+use crate::fitting::{Bench, Candidate, Fitting, Widest, with_relu};
 use crate::lateness;
 use crate::measure::Costs;
+use nearest::{InFormat, nearest};
 
 /// Whether a step of `outputs`' cores fits into its period at a clock, and which numeric format would if it does not: one
 /// line each. `costs` are those of the policy's own format; those of the others are found out here, build by build.
@@ -61,7 +63,6 @@ pub fn lines(
     let others = proposals(policy, target, outputs, clock)?;
     let fits = others.iter().find(|proposal| proposal.share.1 <= 1.0);
     let all: Vec<&Proposal> = own.iter().chain(&others).collect();
-    let nearest = || all.iter().min_by(|a, b| a.share.1.total_cmp(&b.share.1)).copied();
     let whole = whole_period(policy, clock.slot, &all);
     // training again is worth more than another processor, and less than another format
     let (before, behind) = match fits {
@@ -69,22 +70,15 @@ pub fn lines(
         None => (whole, None),
     };
     lines.extend(before);
-    match fits.or_else(nearest) {
-        Some(fitting) if fitting.share.1 <= 1.0 => lines.push(format!(
+    match fits {
+        Some(fitting) => lines.push(format!(
             "  = hint: --format {} takes {} % with {}{}",
             fitting.candidate.format.name(),
             percents(fitting.share),
             fitting.candidate.build(),
             what_it_changes(policy, fitting.candidate.format)
         )),
-        Some(nearest) => {
-            let bench = Bench { target, outputs, clock };
-            lines.extend(too_slow(policy, bench, nearest, &all));
-        }
-        None => lines.push(
-            "  = hint: no numeric format fits: a faster clock, a longer period or a smaller network is needed"
-                .to_owned(),
-        ),
+        None => lines.extend(too_slow(policy, Bench { target, outputs, clock }, &all)),
     }
     lines.extend(behind);
     Ok(lines)
@@ -130,42 +124,55 @@ fn trained_for_the_whole(policy: &Policy) -> String {
 }
 
 /// What would help where no format fits: another clock or period, a smaller network, another activation.
-fn too_slow(policy: &Policy, bench: Bench<'_>, nearest: &Proposal, all: &[&Proposal]) -> Vec<String> {
-    let Proposal { candidate, share } = nearest;
-    let (format, build) = (candidate.format, candidate.build());
+fn too_slow(policy: &Policy, bench: Bench<'_>, all: &[&Proposal]) -> Vec<String> {
+    let Some(nearest) = nearest(policy, all) else {
+        let hint = "  = hint: no numeric format fits: a faster clock, a longer period or a smaller network is needed";
+        return vec![hint.to_owned()];
+    };
+    let Proposal { candidate, share } = nearest.of;
     let mut lines = vec![format!(
-        "  = hint: no numeric format {}; next to it comes {} with {build}, {} %: it fills a period of {:.0} us, or the \
-         present one at {:.0} MHz, where the part can run at it{}",
+        "  = hint: no numeric format {}; next to it comes {} with {}, {} %: it fills a period of {:.0} us{}{}",
         if share.0 <= 1.0 { "surely fits" } else { "fits" },
-        format.name(),
+        candidate.format.name(),
+        candidate.build(),
         percents(*share),
         (1e6 * policy.sample_period * share.1).ceil(),
-        (1e-6 * bench.clock.hz * share.1).ceil(),
-        what_it_changes(policy, format)
+        or_faster(bench.clock, share.1),
+        nearest.remarks(policy)
     )];
-    if let Some(share) = bench.with_relu(&policy.clone().with_format(format), build) {
-        lines.push(format!(
-            "  = hint: trained with relu the same network takes {} % in {} with {build}",
-            percents(share),
-            format.name()
-        ));
-    }
     let candidates: Vec<Candidate> = all.iter().map(|proposal| proposal.candidate.clone()).collect();
-    match bench.widest(policy, &candidates) {
+    // who trains again may choose the activation, too
+    let relu = with_relu(policy);
+    let (whole, with) = match &relu {
+        Some(relu) => (bench.whole(relu, &candidates), " with relu"),
+        None => (None, ""),
+    };
+    lines.extend(whole.as_ref().map(|whole| {
+        format!(
+            "  = hint: trained with relu the same network takes {} % in {} with {}",
+            percents(whole.share),
+            whole.format.name(),
+            whole.build
+        )
+    }));
+    if whole.is_some_and(|whole| whole.fits()) {
+        return lines;
+    }
+    match bench.widest(relu.as_ref().unwrap_or(policy), &candidates) {
         Widest::Fits(Fitting {
             sizes,
             format,
             build,
             share,
         }) => lines.push(format!(
-            "  = hint: this network cut down to {} takes {} % in {} with {build}: train one of that size; interrupt entry and \
+            "  = hint: this network cut down to {}{with} takes {} % in {} with {build}: train one of that size; interrupt entry and \
              drivers come on top",
             arrows(&sizes),
             percents(share),
             format.name()
         )),
         Widest::None(smallest, formats) => lines.push(format!(
-            "  = hint: not even four neurons in each hidden layer surely fit and leave room for interrupt entry, tried in {}: {} takes \
+            "  = hint: not even four neurons in each hidden layer surely fit and leave room for interrupt entry, tried in {}: {}{with} takes \
              {} % in {} with {}; a faster clock, a longer period or another processor is needed",
             tried(&formats),
             arrows(&smallest.sizes),
@@ -176,6 +183,21 @@ fn too_slow(policy: &Policy, bench: Bench<'_>, nearest: &Proposal, all: &[&Propo
         Widest::Unknown => {}
     }
     lines
+}
+
+/// Parts of one core differ by this much in their clocks, and by no more: a Cortex-M4F has 64 to 240 MHz, a Cortex-M0+ 16 to 64 MHz and
+/// few have 133.
+const CLOCKS: f64 = 3.0;
+
+/// The clock that would do, where a part of this core may have it.
+fn or_faster(clock: Clock, times: f64) -> String {
+    if times > CLOCKS {
+        return String::new();
+    }
+    format!(
+        ", or the present one at {:.0} MHz, where the part can run at it",
+        (1e-6 * clock.hz * times).ceil()
+    )
 }
 
 /// `f32 and i16`
@@ -231,6 +253,16 @@ struct Proposal {
     /// `takes` is the larger share.
     candidate: Candidate,
     share: (f64, f64),
+}
+
+impl InFormat for Proposal {
+    fn candidate(&self) -> &Candidate {
+        &self.candidate
+    }
+
+    fn takes(&self) -> String {
+        format!("{} %", percents(self.share))
+    }
 }
 
 impl Proposal {

@@ -43,7 +43,8 @@ pub struct Fitting {
 impl Fitting {
     /// Whether it fits and leaves room for interrupt entry. The room is also what weights move: a constant of another size takes
     /// another instruction, so that of two networks of a size one can fit to the cycle and the other not.
-    fn fits(&self) -> bool {
+    #[must_use]
+    pub fn fits(&self) -> bool {
         self.share.1 <= 1.0 - SCARCE
     }
 
@@ -210,15 +211,14 @@ impl Bench<'_> {
         fastest
     }
 
-    /// The share in a build with ReLU in the place of an activation that is a formula; `None` where there is none such, or where it
-    /// cannot be counted.
+    /// The format and the build that take the policy fastest, as wide as it is; `None` where it cannot be counted.
     #[must_use]
-    pub fn with_relu(&self, policy: &Policy, build: &str) -> Option<(f64, f64)> {
-        let is_formula = |layer: &policy::model::Layer| layer.activation.curve().is_some();
-        if !policy.layers.iter().any(is_formula) {
-            return None;
-        }
-        self.share(&policy.activated_by(policy::Activation::Relu)?, build)
+    pub fn whole(&self, policy: &Policy, candidates: &[Candidate]) -> Option<Fitting> {
+        let found = self.sensible(candidates).into_iter().filter_map(|candidate| {
+            let policy = policy.clone().with_format(candidate.format);
+            self.fastest(&policy, candidate)
+        });
+        found.fold(None, Fitting::nearer)
     }
 
     /// What a step takes, as [`Fitting::share`]; `None` where it cannot be built or does not run here.
@@ -240,6 +240,14 @@ impl Bench<'_> {
         let mut each = plain.flat_map(|build| [build.with_assembly(policy, self.target, files), Some(build)]);
         each.find_map(|build| build.filter(|build| build.name() == name))
     }
+}
+
+/// The policy with ReLU in the place of an activation that is a formula; `None` where there is none such.
+#[must_use]
+pub fn with_relu(policy: &Policy) -> Option<Policy> {
+    let is_formula = |layer: &policy::model::Layer| layer.activation.curve().is_some();
+    let has_formula = policy.layers.iter().any(is_formula);
+    has_formula.then(|| policy.activated_by(policy::Activation::Relu))?
 }
 
 fn sizes(policy: &Policy) -> Vec<usize> {

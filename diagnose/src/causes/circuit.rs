@@ -88,9 +88,9 @@ pub(super) const ESL: Cause = Cause {
     )],
 };
 
-// where the filter rings another part is another frequency, and from its own a fit ends at a beat of the two: from 0.66, 0.8, 1.24 and 1.5 of
-// it as well, which are as far apart as a fit reaches
-const OTHER_PART: Search = Search::OwnOr(&[&[-17.0], &[-10.0], &[12.0], &[25.0]]);
+// where the filter rings another part is another frequency, and from its own a fit ends at a beat of the two: from 0.36, 0.44, 0.54, 0.66,
+// 0.8, 1.24 and 1.5 of it as well, which are as far apart as a fit reaches. Ceramics lose more than half at their rated voltage
+const OTHER_PART: Search = Search::OwnOr(&[&[-32.0], &[-28.0], &[-23.0], &[-17.0], &[-10.0], &[12.0], &[25.0]]);
 
 pub(super) const L_WRONG: Cause = Cause {
     id: "l_wrong",
@@ -129,7 +129,7 @@ pub(super) const L_SATURATION: Cause = Cause {
             "inductance that falls with current",
             &[
                 // the bound is the plant's; it bends from below the usual current to far above, where it is a smaller L
-                knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.99, 0.1)),
+                knob("saturation", &["inductor.saturation"], Reach::Share(0.99, 0.1)),
                 knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
             ],
             Search::From(&[&[0.3, 6.0], &[0.3, 12.0], &[0.3, 25.0], &[4.0, 12.0]]),
@@ -138,7 +138,7 @@ pub(super) const L_SATURATION: Cause = Cause {
         searched(
             "inductance that falls with current as that of a powder core",
             &[
-                knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.99, 0.1)),
+                knob("saturation", &["inductor.saturation"], Reach::Share(0.99, 0.1)),
                 knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
                 knob("steepness", &["inductor.steepness"], Reach::Plain(0.5, 2.0, 0.1)),
             ],
@@ -149,7 +149,7 @@ pub(super) const L_SATURATION: Cause = Cause {
             "inductance that falls steeply with current",
             &[
                 // a steep core that loses more swings for ever where its current stops, and no settled point of it comes to rest
-                knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.95, 0.1)),
+                knob("saturation", &["inductor.saturation"], Reach::Share(0.95, 0.1)),
                 knob("i_sat", &["inductor.i_sat"], Reach::Current(0.3, 8.0, 0.1)),
                 knob("steepness", &["inductor.steepness"], Reach::Plain(1.0, 32.0, 0.5)),
             ],
@@ -161,15 +161,42 @@ pub(super) const L_SATURATION: Cause = Cause {
 pub(super) const C_DERATING: Cause = Cause {
     id: "c_derating",
     kind: Kind::Part,
-    forms: &[searched(
-        "capacitance that falls with voltage",
-        &[
-            // as of the inductance
-            knob("derating", &["capacitor.derating"], Reach::Plain(0.0, 0.95, 0.1)),
-            knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 5.0, 0.1)),
-        ],
-        Search::From(&[&[0.3, 6.0], &[0.3, 12.0], &[0.3, 25.0], &[4.0, 12.0]]),
-    )],
+    forms: &[
+        searched(
+            "capacitance that falls with voltage",
+            &[
+                knob("derating", &["capacitor.derating"], Reach::Share(1.0, 0.1)),
+                knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 5.0, 0.1)),
+            ],
+            // at the output's voltage the last four leave .76, .63, .48 and .30, as far apart as those of another part
+            Search::From(&[
+                &[0.3, 6.0],
+                &[0.3, 12.0],
+                &[0.3, 25.0],
+                &[4.0, 12.0],
+                &[9.0, 12.0],
+                &[9.5, 9.0],
+                &[9.5, 6.0],
+            ]),
+        ),
+        // a label has a tolerance, and a model may hold what was measured at the output's voltage
+        searched(
+            "capacitance that falls with voltage from another one at none",
+            &[
+                knob("derating", &["capacitor.derating"], Reach::Share(1.0, 0.1)),
+                knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 5.0, 0.1)),
+                knob("capacitance", &["converter.capacitance"], Reach::Own(0.3, 3.0, 0.02)),
+            ],
+            // in all they leave .42, .64, .84, 1 and 1.15 of the model's at the output's voltage, twice with a slope as steep as ceramics have
+            Search::From(&[
+                &[9.0, 9.0, 42.0],
+                &[4.0, 12.0, 42.0],
+                &[9.0, 9.0, 84.0],
+                &[9.0, 9.0, 100.0],
+                &[4.0, 12.0, 75.0],
+            ]),
+        ),
+    ],
 };
 
 pub(super) const CORE_LOSS: Cause = Cause {

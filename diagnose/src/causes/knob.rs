@@ -40,6 +40,9 @@ pub(crate) enum Reach {
     Time(f64, f64, f64),
     /// As it is.
     Plain(f64, f64, f64),
+    /// The share that a part loses along its curve: highest and step. A part may lose all of it, so that the upper end, close to all, cuts
+    /// nothing off.
+    Share(f64, f64),
 }
 
 /// Lags shorter than this share of a period are left out: between samples a period apart they leave no trace (e^-100), and the
@@ -79,6 +82,23 @@ impl Knob {
     #[must_use]
     pub fn is_resistor(&self) -> bool {
         self.resistor.is_some()
+    }
+
+    /// Keys of the plant file under which a user knows the number. The sampling instant and the resistors of the load, which a record may
+    /// move away from it, have them, too.
+    #[must_use]
+    pub fn known_as(&self) -> &'static [&'static str] {
+        match (self.resistor, self.keys) {
+            (Some(_), _) => &["load.resistor_gain"],
+            (None, []) => &["pwm.sampling_phase"],
+            (None, keys) => keys,
+        }
+    }
+
+    /// Whether it is the share that a part loses along its curve.
+    #[must_use]
+    pub fn is_share(&self) -> bool {
+        matches!(self.reach, Reach::Share(..))
     }
 
     /// SI unit.
@@ -147,6 +167,7 @@ impl Knob {
             Reach::Current(low, high, step) => by(bases.i, low, high, step),
             Reach::Time(low, high, step) => by(bases.t_sw, low, high, step),
             Reach::Plain(low, high, step) => [low, high, step],
+            Reach::Share(high, step) => [0.0, high, step],
         }
     }
 }

@@ -169,10 +169,9 @@ impl Candidate {
     /// Whether it changes one of these numbers of the plant file.
     #[must_use]
     pub fn changes(&self, keys: &[String]) -> bool {
-        let has = |key: &str| keys.iter().any(|one| one == key);
-        let mut knobs = self.form.knobs.iter();
-        // a factor of one resistor has no key of its own
-        knobs.any(|knob| knob.keys.iter().any(|key| has(key)) || knob.is_resistor() && has("load.resistor_gain"))
+        let has = |key: &&str| keys.iter().any(|one| one == key);
+        let knobs = self.form.knobs.iter();
+        knobs.flat_map(|knob| knob.known_as()).any(has)
     }
 
     /// Starts that are given in steps of its parameters: above the model's value, or of several parameters as they are.
@@ -261,6 +260,31 @@ mod tests {
                 for key in knob.keys {
                     assert!(plant::parameter(key).is_some(), "{}: {key}", cause.id);
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn a_number_that_is_certain_takes_its_causes_away() {
+        let text = "[converter]\nv_in = 48.0\ninductance = 22e-6\ncapacitance = 330e-6\nf_sw = 200e3\n";
+        let model = Model::new(&plant::Parameters::from_toml("plant.toml".as_ref(), text).unwrap());
+        let bases = Bases {
+            v: 12.0,
+            i: 5.0,
+            v_in: 48.0,
+            t_sw: 5e-6,
+        };
+        let candidates = candidates(&model, &bases);
+        let left = |key: &str| {
+            let mut left = candidates.iter().filter(|one| !one.changes(&[key.to_owned()]));
+            left.any(|one| one.cause.id == "sampling_delay")
+        };
+        assert!(!left("pwm.sampling_phase") && left("pwm.carrier"));
+        for candidate in &candidates {
+            for key in candidate.form.knobs.iter().map(|knob| knob.known_as()) {
+                assert!(!key.is_empty(), "{}", candidate.cause.id);
+                assert!(key.iter().all(|key| plant::parameter(key).is_some()), "{key:?}");
+                assert!(key.iter().all(|key| candidate.changes(&[(*key).to_owned()])), "{key:?}");
             }
         }
     }

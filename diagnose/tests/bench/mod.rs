@@ -13,6 +13,20 @@ use measured::{ColumnMap, Sheet};
 use plant::Parameters;
 use toml_input::Faults;
 
+/// Moves `x` by `steps` steps of `h` s, by Runge and Kutta's method of the fourth order.
+pub fn integrate<const N: usize>(x: &mut [f64; N], h: f64, steps: usize, slope: impl Fn([f64; N]) -> [f64; N]) {
+    let moved = |x: &[f64; N], by: f64, k: &[f64; N]| std::array::from_fn(|n| x[n] + by * k[n]);
+    for _ in 0..steps {
+        let a = slope(*x);
+        let b = slope(moved(x, 0.5 * h, &a));
+        let c = slope(moved(x, 0.5 * h, &b));
+        let d = slope(moved(x, h, &c));
+        for n in 0..N {
+            x[n] += h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]);
+        }
+    }
+}
+
 /// Longest step of the integration, periods.
 const STEP: f64 = 1.0 / 24.0;
 

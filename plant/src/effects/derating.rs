@@ -4,7 +4,7 @@
 //! voltage; nothing in the mean. At one voltage it cannot be told from a smaller C.
 
 use crate::entry::{Effect, Way, detail, number};
-use crate::parameters::Capacitor;
+use crate::parameters::{Capacitor, Parameters};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
@@ -16,8 +16,8 @@ pub const EFFECT: Effect = Effect {
             capacitor.derating,
             "1",
             "share of the capacitance that is lost far above v_half",
-            // something must be left: the steps of the full circuit are as short as the least capacitance asks for
-            (0.0, 0.95),
+            // 1 is `C0 / (1 + x^2)`: at every voltage something is left
+            (0.0, 1.0),
             // ceramics of class II at their rated voltage
             (0.1, 0.8),
             0.0
@@ -25,13 +25,23 @@ pub const EFFECT: Effect = Effect {
         detail!(
             capacitor.v_half,
             "V",
-            "voltage at which half of that share is lost",
+            "voltage at which half of that share is lost: C = C0 (1 - derating y / (1 + y)), y = (v / v_half)^2",
             (1e-3, 1e6),
             (5.0, 200.0),
             100.0
         ),
     ],
 };
+
+/// The least that is left of C0 while the converter works: at `BEYOND` times the source's voltage.
+pub(crate) fn least(p: &Parameters) -> f64 {
+    relative_capacitance(&p.capacitor, BEYOND * p.converter.v_in)
+}
+
+/// Output voltage over that of the source, beyond which nobody asks how accurate a step is.
+// an undamped filter swings up to twice the source; boosts and buck-boosts of more than four times it are rare, and steps of a twentieth
+// of a time constant leave room
+const BEYOND: f64 = 4.0;
 
 /// C(v) over C0.
 #[inline]

@@ -30,7 +30,7 @@ pub const EFFECT: Effect = Effect {
         detail!(
             inductor.i_sat,
             "A",
-            "current at which half of that share is lost",
+            "current at which half of that share is lost: L = L0 (1 - saturation y / (1 + y)), y = (i / i_sat)^(2 steepness)",
             (1e-3, 1e6),
             (2.0, 50.0),
             10.0

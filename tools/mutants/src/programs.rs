@@ -42,6 +42,25 @@ const ACROSS: &[(&str, &[&str])] = &[
         ],
     ),
     ("certificate", &["--skip", "marabou"]),
+    // what the library counts and judges is told by the command line alone
+    (
+        "cli",
+        &[
+            "actor::",
+            "codes::",
+            "commands::",
+            "decisions::",
+            "faults::",
+            "files::",
+            "gains::",
+            "json::",
+            "loudness::",
+            "replay",
+            "several::",
+            "tables::",
+            "traces::",
+        ],
+    ),
     // assembly is in no file that a host builds
     (
         "on_target",
@@ -65,6 +84,8 @@ pub struct Test {
     pub path: PathBuf,
     /// Where it runs.
     pub folder: PathBuf,
+    /// Where cargo builds what it starts.
+    pub target: PathBuf,
 }
 
 impl Test {
@@ -171,6 +192,7 @@ impl Build<'_> {
                 name,
                 path: path.clone(),
                 folder: folder.clone(),
+                target: self.target.to_owned(),
             }));
         }
         Ok(tests)

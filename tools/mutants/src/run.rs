@@ -51,6 +51,7 @@ pub fn run(test: &Test, switched: Switched, limit: Duration) -> Result<(End, Dur
         // one core: the machine has others to serve
         .env("RUST_TEST_THREADS", "1")
         .env("RUST_BACKTRACE", "0")
+        .env("CARGO_TARGET_DIR", &test.target)
         .env_remove("POLICYC_BLESS")
         .stdin(Stdio::null())
         .stdout(Stdio::null())
@@ -139,6 +140,7 @@ mod tests {
             name: path.to_str().unwrap().into(),
             path: "/bin/sh".into(),
             folder: "/".into(),
+            target: "/".into(),
         };
         let end = run(&test, Switched::On(7), limit).unwrap().0;
         std::fs::remove_file(path).unwrap();

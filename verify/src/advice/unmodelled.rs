@@ -13,18 +13,16 @@ use policy::{NumericFormat, Policy};
 use report::grouped;
 use targets::TargetSpec;
 
-use super::{arrows, in_format, others, trained_for_the_whole, tried, what_it_changes};
+use super::nearest::{InFormat, nearest};
+use super::{arrows, in_format, or_faster, others, trained_for_the_whole, tried, what_it_changes};
 use crate::budget::{Clock, Slot};
 use crate::costs::StepCosts;
-use crate::fitting::{Bench, Candidate, Fitting, Widest};
+use crate::fitting::{Bench, Candidate, Fitting, Widest, with_relu};
 use crate::measure::Costs;
 
 /// A branch may be folded into the instructions beside it, so that a cycle ends more than begin in it: in the loops of a network less
 /// than a tenth of the instructions are branches.
 const FOLDED: f64 = 1.1;
-
-/// Of formats that need about as much the most exact is proposed: 8 bits need no fewer instructions than 16 on many cores.
-const ALIKE: f64 = 1.1;
 
 /// A policy on a processor.
 #[derive(Clone, Copy)]
@@ -48,6 +46,16 @@ impl Need {
     /// Instructions for each cycle.
     fn a_cycle(&self) -> f64 {
         self.candidate.takes
+    }
+}
+
+impl InFormat for Need {
+    fn candidate(&self) -> &Candidate {
+        &self.candidate
+    }
+
+    fn takes(&self) -> String {
+        format!("{:.2}", self.a_cycle())
     }
 }
 
@@ -210,44 +218,57 @@ impl Case<'_> {
             )];
         }
         let all = || std::iter::once(own).chain(rest);
-        let least = all().map(|need| need.a_cycle()).fold(f64::INFINITY, f64::min);
-        let nearest = all().find(|need| need.a_cycle() <= ALIKE * least).unwrap_or(own);
-        let (format, a_cycle, build) = (nearest.candidate.format, nearest.a_cycle(), nearest.candidate.build());
+        let needs: Vec<&Need> = all().collect();
+        let Some(nearest) = nearest(self.policy, &needs) else {
+            return Vec::new();
+        };
+        let (candidate, a_cycle) = (&nearest.of.candidate, nearest.of.a_cycle());
         let mut lines: Vec<String> = self.whole_period(all()).into_iter().collect();
         lines.push(format!(
-            "  = hint: no numeric format comes down to one instruction a cycle; next to it comes {} with {build}, {a_cycle:.2}: one \
-             instruction a cycle fills a period of {:.0} us, or the present one at {:.0} MHz, where the part can run at it{}",
-            format.name(),
+            "  = hint: no numeric format comes down to one instruction a cycle; next to it comes {} with {}, {a_cycle:.2}: one \
+             instruction a cycle fills a period of {:.0} us{}{}",
+            candidate.format.name(),
+            candidate.build(),
             (1e6 * self.policy.sample_period * a_cycle).ceil(),
-            (1e-6 * self.clock.hz * a_cycle).ceil(),
-            what_it_changes(self.policy, format)
+            or_faster(self.clock, a_cycle),
+            nearest.remarks(self.policy)
         ));
         let bench = Bench {
             target: self.target,
             outputs: self.outputs,
             clock: self.clock,
         };
-        if let Some((a_cycle, _)) = bench.with_relu(&self.policy.clone().with_format(format), build) {
-            lines.push(format!(
-                "  = hint: trained with relu the same network needs {a_cycle:.2} in {} with {build}",
-                format.name()
-            ));
-        }
         let candidates: Vec<Candidate> = all().map(|need| need.candidate.clone()).collect();
-        match bench.widest(self.policy, &candidates) {
+        let relu = with_relu(self.policy);
+        let (whole, with) = match &relu {
+            Some(relu) => (bench.whole(relu, &candidates), " with relu"),
+            None => (None, ""),
+        };
+        lines.extend(whole.as_ref().map(|whole| {
+            format!(
+                "  = hint: trained with relu the same network needs {:.2} in {} with {}",
+                whole.share.1,
+                whole.format.name(),
+                whole.build
+            )
+        }));
+        if whole.is_some_and(|whole| whole.fits()) {
+            return lines;
+        }
+        match bench.widest(relu.as_ref().unwrap_or(self.policy), &candidates) {
             Widest::Fits(Fitting {
                 sizes,
                 format,
                 build,
                 share,
             }) => lines.push(format!(
-                "  = hint: this network cut down to {} needs {:.2} in {} with {build}: train one of that size or below; the board decides",
+                "  = hint: this network cut down to {}{with} needs {:.2} in {} with {build}: train one of that size or below; the board decides",
                 arrows(&sizes),
                 share.0,
                 format.name()
             )),
             Widest::None(smallest, formats) => lines.push(format!(
-                "  = hint: not even four neurons in each hidden layer come down to one instruction a cycle, tried in {}: {} needs {:.2} in \
+                "  = hint: not even four neurons in each hidden layer come down to one instruction a cycle, tried in {}: {}{with} needs {:.2} in \
                  {} with {}; a faster clock, a longer period or another processor is needed",
                 tried(&formats),
                 arrows(&smallest.sizes),

@@ -127,6 +127,7 @@ impl Log {
         if observed.iter().all(Option::is_none) {
             notes.extend(unread_observations(policy, &sheet, &located));
         }
+        notes.extend(twice(policy, &sheet, &located, &observations));
         Ok(Self {
             samples,
             begins,
@@ -280,6 +281,23 @@ fn unread_observations(policy: &Policy, sheet: &Sheet, located: &Located) -> Opt
             pairs.join(",")
         )
     })
+}
+
+/// Observations that a map reads from the column of a signal: that is what the network saw only if nothing was done to the signal.
+fn twice(policy: &Policy, sheet: &Sheet, located: &Located, observations: &[Vec<String>]) -> Vec<String> {
+    let column = |name: &String| located.signal(name).and_then(|signal| signal.column());
+    let note = |name: &String| {
+        let signal = policy
+            .signals
+            .iter()
+            .find(|signal| column(&signal.name) == column(name))?;
+        let read = &sheet.columns().get(column(name)?)?.name;
+        Some(format!(
+            "`{name}` and the signal `{}` are both read from `{read}`: so the network is taken to have seen the signal as it is",
+            signal.name
+        ))
+    };
+    observations.iter().filter_map(|names| note(names.first()?)).collect()
 }
 
 /// Columns that say what the trainer did, beside samples and observations.

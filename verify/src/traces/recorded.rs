@@ -82,11 +82,11 @@ impl<'a> SignalColumns<'a> {
         for quantity in &quantities {
             let is_open =
                 located.signal(quantity.name).is_none() && guesses.iter().all(|(name, _)| *name != quantity.name);
-            if let Some(header) = sheet.nearly(located, quantity).filter(|_| is_open) {
-                guesses.push((quantity.name, header));
+            if is_open {
+                guesses.push((quantity.name, sheet.nearly(located, quantity).unwrap_or("COLUMN")));
             }
         }
-        let proposal = proposal(&guesses);
+        let proposal = proposal(&guesses).unwrap_or_default();
         for (signal, quantity) in self.policy.signals.iter().zip(&quantities) {
             match located.signal(&signal.name) {
                 Some(found) => columns.push((signal, found)),
@@ -95,10 +95,7 @@ impl<'a> SignalColumns<'a> {
                     let message = Message::new(format!("no column for the signal `{}`", signal.name))
                         .found(sheet.listed())
                         .expected(format!("a column {}", names.join(" or ")))
-                        .hint(match &proposal {
-                            Some(map) => format!("say where it stands: {map}"),
-                            None => format!("say where it stands, --map {}=COLUMN", signal.name),
-                        });
+                        .hint(format!("say where it stands: {proposal}"));
                     faults.push(sheet.header_fault(message));
                 }
             }

@@ -364,11 +364,14 @@ fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
 /// A rival: its ids, and the values that it needs.
 type Rival = (Vec<&'static str>, Vec<RivalValue>);
 
-/// The same ids may come from two forms of a cause: the first fits best.
+/// The same ids may come from two forms of a cause, each of which fits as well: the one with fewer values is told, since a filter can be made
+/// to do what a resistance does.
 fn each_once(sets: impl Iterator<Item = Rival>) -> Vec<Rival> {
     sets.fold(Vec::new(), |mut list: Vec<Rival>, rival| {
-        if list.iter().all(|(ids, _)| *ids != rival.0) {
-            list.push(rival);
+        match list.iter_mut().find(|(ids, _)| *ids == rival.0) {
+            Some(known) if rival.1.len() < known.1.len() => *known = rival,
+            Some(_) => {}
+            None => list.push(rival),
         }
         list
     })

@@ -114,7 +114,9 @@ fn of_best(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> (
             curve: vec![(value, 0.0)],
         };
         let sigma = (best.covariance[*number][*number] * attribution.inflation).sqrt();
-        let [low, high, _] = fitter.range(place);
+        let [low, high, step] = fitter.range(place);
+        // where the fit held it at an end, or had no slope, its own step is the scale at which other values are tried
+        let sigma = if sigma > 0.0 { sigma } else { step };
         let lower: RefCell<Option<Fit>> = RefCell::new(None);
         let at_value = |x: f64| {
             let mut values = best.values.clone();
@@ -133,8 +135,7 @@ fn of_best(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> (
         if matches!(candidate.form.search, Search::Counter(_)) {
             profile.interval = [-1.0, 1.0].map(|side| alike(value, side, &at_value));
         }
-        // without a slope there is no scale at which to try other values
-        if !fitter.is_smooth(place) || sigma.is_nan() || sigma <= 0.0 {
+        if !fitter.is_smooth(place) {
             return (profile, None);
         }
         for at in PLACES {

@@ -1,5 +1,7 @@
 //! The verdict for a reader.
 
+use plant::Topology;
+
 use crate::doubts;
 use crate::examine::Examined;
 use crate::findings::{Aside, Named, Verdict};
@@ -310,6 +312,33 @@ pub fn curves(found: &Examined) -> Vec<String> {
         ))
     };
     causes.filter_map(|cause| note(attribution.id(*cause))).collect()
+}
+
+/// Where a resistance of the source lies that was found without an input capacitor, and what it would be before one.
+pub fn pulsed(found: &Examined) -> Option<String> {
+    let Examined {
+        problem, attribution, ..
+    } = found;
+    let best = attribution.best.as_ref()?;
+    let is_source = |cause: &usize| attribution.id(*cause) == "source_impedance";
+    let (plant, bases) = (&attribution.state().model.plant, &problem.bases);
+    let resistance = plant.source.resistance;
+    let has_none = plant.source.c_in == 0.0 && best.causes.iter().any(is_source) && resistance > 0.0;
+    // the switch of a boost does not interrupt what the source gives
+    let duty = match plant.converter.topology {
+        Topology::Buck => bases.v / bases.v_in,
+        Topology::BuckBoost => bases.v / (bases.v + bases.v_in),
+        Topology::Boost => return None,
+    };
+    (has_none && duty < 1.0).then(|| {
+        format!(
+            "the model has no input capacitor, so that {} of the source carry the pulses of the switch's current and lie between that capacitor \
+             and the switch. Leads or a fuse before a capacitor have about {} where they do the same: with source.c_in and source.esr_in in the \
+             plant file that is what is sought",
+            si(resistance, "ohm"),
+            si(resistance / duty, "ohm")
+        )
+    })
 }
 
 /// Said behind the verdict: what no fit to the training records can know.

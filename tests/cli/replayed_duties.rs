@@ -34,9 +34,14 @@ fn duties_of_the_contract_are_equal_and_others_are_told_with_those_that_fit() {
     let with = |duties: [f64; 3]| log(",duty", move |row| format!(",{}", duties[action(row)]));
     let (code, text) = said(&with(DUTIES), REPLAY);
     assert_eq!(code, Some(0), "{text}");
-    // three digits of a log are enough
+    assert!(text.contains("to the last digit"), "{text}");
+    // in all rows of an action alike, a thousandth is another duty and no rounding
     let (code, text) = said(&with([0.4004, 0.4996, 0.6]), REPLAY);
-    assert_eq!(code, Some(0), "{text}");
+    assert_eq!(code, Some(1), "{text}");
+    assert!(
+        text.contains("duties = [0.4004, 0.4996, 0.6] in [actions] fits the log"),
+        "{text}"
+    );
     let (code, text) = said(&with([0.6, 0.5, 0.4]), REPLAY);
     assert_eq!(code, Some(1), "{text}");
     for part in [
@@ -199,6 +204,12 @@ fn what_an_action_adds_is_held_against_the_log() {
     };
     let (code, text) = rounded(3, [-0.0203, 0.0, 0.0203]);
     assert_eq!(code, Some(0), "{text}");
+    // six show what three hide: a little more in every row of the action
+    let (code, text) = rounded(6, [-0.02, 0.0, 0.0203]);
+    assert!(
+        code == Some(1) && text.contains("action 2 adds 0.02 in the contract and 0.0203"),
+        "{text}"
+    );
     desk.edit("policy/policy.toml", "[-0.02, 0.0, 0.02]", "[-0.008, 0.0, 0.008]");
     let (code, text) = rounded(2, [-0.008, 0.0, 0.008]);
     assert!(code == Some(0) && !text.contains("are others"), "{text}");

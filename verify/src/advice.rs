@@ -218,9 +218,12 @@ fn what_it_changes(policy: &Policy, format: NumericFormat) -> String {
                 true => " (`policyc replay --golden` makes them of a log)",
                 false => "",
             };
-            format!("; golden answers would tell what it changes of the decisions{made}")
+            format!(
+                "; golden answers would tell what it changes of the {}{made}",
+                commanded(policy)
+            )
         }
-        None => "; it changes no more golden decisions than allowed".to_owned(),
+        None => format!("; it changes the golden {} by no more than allowed", commanded(policy)),
         Some(decisions) => {
             let what = decisions.beyond().map(|(output, own)| {
                 let of = output.map_or_else(String::new, |name| format!(" of {name}"));
@@ -238,6 +241,15 @@ fn what_it_changes(policy: &Policy, format: NumericFormat) -> String {
                 decisions.remedy()
             )
         }
+    }
+}
+
+/// What the network decides on.
+fn commanded(policy: &Policy) -> &'static str {
+    match (policy.head.is_choice(), policy.head.schedule()) {
+        (true, _) => "decisions",
+        (false, Some(_)) => "gains",
+        (false, None) => "duties",
     }
 }
 

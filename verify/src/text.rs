@@ -29,7 +29,12 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
         write_drift(&mut out, drift)?;
     }
     if let Some(golden) = &report.golden {
-        writeln!(out, "golden vectors   {golden}")?;
+        let read = if policy.numeric_format.is_integer() {
+            "in f32: "
+        } else {
+            ""
+        };
+        writeln!(out, "golden vectors   {read}{golden}")?;
     }
     if let Some(decisions) = &report.decisions {
         for line in self::decisions(policy, decisions) {

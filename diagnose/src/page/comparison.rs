@@ -259,7 +259,8 @@ pub(super) fn section(list: &[Compared], residuals: &[Driven]) -> Section {
     let section = Section::new("How well the model fits").text(words).table(table).text(format!(
         "Fit is 100 % less the error over what the channel moves. Chi²/N is 1 where only noise is left; below 1 the noise, which is \
          read off neighbouring rows, is estimated high, as it is where a record rings. White is an error that resembles \
-         itself no more than noise does in {:.0} of 100 records.",
+         itself no more than noise does in {:.0} of 100 records; a “no” beside a chi²/N near 1 is less than what a verdict asks for, and no part \
+         of the answer.",
         100.0 * (1.0 - COLOURED)
     ));
     if residuals.is_empty() {

@@ -10,6 +10,13 @@ use super::log::{Done, Log};
 // three digits of a log; neighbours in a table of actions are farther apart
 const SAME: f64 = 5e-3;
 
+/// What one action differs by in all of its rows alike is another duty from this share of the largest on, whatever the log scatters by.
+// a trainer in binary32 is off by a hundredth of it; an offset of .005 that should be .0051 by ten times it
+const FINE: f64 = 1e-5;
+
+/// Standard errors of the mean of an action's rows that are no chance: of a hundred actions none in ten thousand logs.
+const SURE: f64 = 5.0;
+
 /// Most actions that are named one by one: a reader takes in no more.
 const MOST_NAMED: usize = 8;
 
@@ -22,6 +29,8 @@ pub struct DutyResult {
     pub equal: usize,
     /// Line of the first other one.
     pub first_line: Option<usize>,
+    /// Largest difference of a duty from the contract's.
+    pub worst: f64,
     /// Where the duties come from: a column, or a feature.
     pub source: String,
     /// What the log has with each action of the contract, if it is one duty.
@@ -56,12 +65,23 @@ pub(super) fn duties(of: Logged<'_>, commanded: &[f64]) -> Option<DutyResult> {
         Head::Continuous(_) | Head::Schedule(_) | Head::Several(_) => return None,
     };
     let own: Vec<f64> = table.iter().map(|action| action.duty).collect();
-    let (source, derived, pairs) = pairs(of)?;
+    let Pairs {
+        source,
+        derived,
+        pairs,
+        step,
+    } = pairs(of)?;
     let largest = own.iter().fold(0.0_f64, |most, duty| most.max(duty.abs()));
     let is_same = |a: f64, b: f64| (a - b).abs() <= SAME * largest;
-    let others: Vec<&Pair> = (pairs.iter())
-        .filter(|(_, action, duty)| !own.get(*action).is_some_and(|own| is_same(*own, *duty)))
-        .collect();
+    let more = |pair: &&Pair| Some((pair.1, pair.2 - own.get(pair.1)?));
+    let more: Vec<(usize, f64)> = pairs.iter().filter_map(|pair| more(&pair)).collect();
+    let step = unless_written(step, own.iter().copied());
+    let off = off_alike(own.len(), &more, (FINE * largest).max(0.5 * step * 1.001));
+    let is_other = |(_, action, duty): &&Pair| {
+        let is_own = own.get(*action).is_some_and(|own| is_same(*own, *duty));
+        !is_own || off.get(*action).copied().unwrap_or(true)
+    };
+    let others: Vec<&Pair> = pairs.iter().filter(is_other).collect();
     let logged = (0..own.len()).map(|action| {
         let mut of_it = pairs.iter().filter(|pair| pair.1 == action).map(|pair| pair.2);
         let first = of_it.next()?;
@@ -71,6 +91,7 @@ pub(super) fn duties(of: Logged<'_>, commanded: &[f64]) -> Option<DutyResult> {
         rows: pairs.len(),
         equal: pairs.len() - others.len(),
         first_line: others.first().map(|(row, ..)| log.line(*row)),
+        worst: worst(more.iter().map(|(_, more)| *more)),
         source,
         logged: logged.collect(),
         own: own.clone(),
@@ -79,12 +100,36 @@ pub(super) fn duties(of: Logged<'_>, commanded: &[f64]) -> Option<DutyResult> {
     })
 }
 
+/// The actions whose rows differ from the contract alike: their mean is off by more than `allowed` and than the scatter of all rows explains.
+fn off_alike(actions: usize, more: &[(usize, f64)], allowed: f64) -> Vec<bool> {
+    let of = |action: usize| more.iter().filter(move |(of, _)| *of == action).map(|(_, more)| *more);
+    let means: Vec<f64> = (0..actions)
+        .map(|action| of(action).sum::<f64>() / of(action).count().max(1) as f64)
+        .collect();
+    let around = |(action, more): &(usize, f64)| means.get(*action).map_or(0.0, |mean| (more - mean) * (more - mean));
+    let scatter = (more.iter().map(around).sum::<f64>() / more.len().max(1) as f64).sqrt();
+    let is_off = |(action, mean): (usize, &f64)| {
+        let rows = of(action).count() as f64;
+        rows > 0.0 && mean.abs() > allowed.max(SURE * scatter / rows.sqrt())
+    };
+    means.iter().enumerate().map(is_off).collect()
+}
+
+fn worst(more: impl Iterator<Item = f64>) -> f64 {
+    more.map(f64::abs).filter(|more| more.is_finite()).fold(0.0, f64::max)
+}
+
 /// The same where an action adds to a law: what the log has more or less than the contract commands is what its action adds more or
 /// less.
 fn added(of: Logged<'_>, head: &Residual, commanded: &[f64]) -> Option<DutyResult> {
     let log = of.log;
     let own: Vec<f64> = head.offsets.iter().map(|action| action.duty).collect();
-    let (source, derived, pairs) = pairs(of)?;
+    let Pairs {
+        source,
+        derived,
+        pairs,
+        step: digit,
+    } = pairs(of)?;
     let apart = own
         .iter()
         .enumerate()
@@ -93,18 +138,32 @@ fn added(of: Logged<'_>, head: &Residual, commanded: &[f64]) -> Option<DutyResul
     // a quarter of what tells two actions apart, if that is less; a step of the log, half of which the duty before is off and half
     // the one behind
     let rows = pairs.iter().filter_map(|pair| commanded.get(pair.0)).copied();
-    let step = rounding(pairs.iter().map(|pair| pair.2), rows);
+    let digit = unless_written(digit, rows.clone());
+    // one digit of a duty says nothing to anybody, so nobody logs it; below a millionth it is no rounding
+    let step = if digit < LEAST_STEP || derived { 0.0 } else { digit };
     let allowed = (SAME * head.limits.high.abs()).min(0.25 * apart).max(step * 1.001);
     if allowed >= 0.5 * apart {
         // rounded so coarsely that one action looks like its neighbour
         return None;
     }
     let is_inside = |duty: f64| head.limits.low + allowed < duty && duty < head.limits.high - allowed;
+    let all = pairs.iter().map(|(row, action, duty)| {
+        let command = commanded.get(*row).copied().unwrap_or(f64::NAN);
+        (*action, *duty, command)
+    });
+    let inside: Vec<(usize, f64)> = (all.clone())
+        .filter(|(_, duty, command)| is_inside(*duty) && is_inside(*command))
+        .map(|(action, duty, command)| (action, duty - command))
+        .collect();
+    let fine = (FINE * head.limits.high.abs()).max(digit * 1.001);
+    let off = off_alike(own.len(), &inside, fine);
+    let farthest = worst(all.map(|(_, duty, command)| duty - command));
     let mut more: Vec<Vec<f64>> = vec![Vec::new(); own.len()];
     let mut others = Vec::new();
     for (row, action, duty) in &pairs {
         let command = commanded.get(*row).copied().unwrap_or(f64::NAN);
-        let is_other = (duty - command).abs() > allowed || command.is_nan();
+        let is_off = off.get(*action).copied().unwrap_or(false) && is_inside(*duty) && is_inside(command);
+        let is_other = (duty - command).abs() > allowed || command.is_nan() || is_off;
         if is_other {
             others.push(*row);
         }
@@ -125,6 +184,7 @@ fn added(of: Logged<'_>, head: &Residual, commanded: &[f64]) -> Option<DutyResul
         rows: pairs.len(),
         equal: pairs.len() - others.len(),
         first_line: others.first().map(|row| log.line(*row)),
+        worst: farthest,
         source,
         logged: logged.collect(),
         own: own.clone(),
@@ -133,18 +193,26 @@ fn added(of: Logged<'_>, head: &Residual, commanded: &[f64]) -> Option<DutyResul
     })
 }
 
-/// The decimal step to which a log was rounded: its values are multiples of it, and what the contract makes is not; 0 where there is
-/// none down to a millionth.
-fn rounding(logged: impl Iterator<Item = f64> + Clone, mut commanded: impl Iterator<Item = f64>) -> f64 {
-    let is_multiple = |value: f64, step: f64, near: f64| ((value / step).round() * step - value).abs() < near * step;
-    // binary64 of a decimal is off by less than a billionth of these steps
-    let is_written = |step: &f64| logged.clone().all(|value| is_multiple(value, *step, 1e-6));
-    // one digit of a duty says nothing to anybody, so nobody logs it
-    let found = [0.01, 1e-3, 1e-4, 1e-5, 1e-6].into_iter().find(is_written);
-    // binary32 of a duty is off by a thirtieth of the smallest
-    found
-        .filter(|step| !commanded.all(|value| is_multiple(value, *step, 0.05)))
-        .unwrap_or(0.0)
+/// Below it a step of decimals is no rounding that matters to a table of actions.
+const LEAST_STEP: f64 = 1e-6;
+
+fn is_multiple(value: f64, step: f64, near: f64) -> bool {
+    ((value / step).round() * step - value).abs() < near * step
+}
+
+/// The decimal step of a column: its values are multiples of it; 0 where there is none down to a billionth.
+fn decimal_step(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    // binary64 of a decimal is off by less than a millionth of these steps
+    let is_written = |step: &f64| values.clone().all(|value| is_multiple(value, *step, 1e-6));
+    let steps = [0.01, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
+    steps.into_iter().find(is_written).unwrap_or(0.0)
+}
+
+/// The step as one of rounding: 0 where what the contract makes lies on it, too.
+fn unless_written(step: f64, mut own: impl Iterator<Item = f64>) -> f64 {
+    // binary32 of a duty is off by a thirtieth of a millionth
+    let is_own = step >= LEAST_STEP && own.all(|value| is_multiple(value, step, 0.05));
+    if is_own { 0.0 } else { step }
 }
 
 /// The duty before each row, as the log has it: `None` where it does not say. A law may read it, and what an action adds shows only
@@ -161,8 +229,8 @@ pub(super) fn before(of: Logged<'_>) -> Vec<Option<f64>> {
             .collect();
     }
     let mut list = vec![None; log.rows()];
-    if let (Head::Residual(head), Some((_, _, pairs))) = (of.path.head, pairs(of)) {
-        for (row, _, duty) in pairs {
+    if let (Head::Residual(head), Some(found)) = (of.path.head, pairs(of)) {
+        for (row, _, duty) in found.pairs {
             let goes_on = log.begins.get(row + 1) == Some(&false);
             // another one is no duty that these actions lead to
             let is_duty = head.limits.low <= duty && duty <= head.limits.high;
@@ -174,8 +242,19 @@ pub(super) fn before(of: Logged<'_>) -> Vec<Option<f64>> {
     list
 }
 
-/// Where the duties of the log's actions stand, and the pairs.
-fn pairs(of: Logged<'_>) -> Option<(String, bool, Vec<Pair>)> {
+/// Where the duties of the log's actions stand.
+struct Pairs {
+    /// A column, or a feature.
+    source: String,
+    /// They were worked out from a feature.
+    derived: bool,
+    pairs: Vec<Pair>,
+    /// Decimal step of the duties, from the digits of their column; 0 where it has none.
+    step: f64,
+}
+
+/// The duties of the log's actions; `None` where it has none.
+fn pairs(of: Logged<'_>) -> Option<Pairs> {
     let Logged {
         policy,
         path,
@@ -187,11 +266,12 @@ fn pairs(of: Logged<'_>) -> Option<(String, bool, Vec<Pair>)> {
     let action = |row: usize| Some(*actions.get(row).filter(|_| is_said(row))? as usize);
     if let Some(duties) = &done.duty {
         let pair = |(row, duty): (usize, &f64)| Some((row, action(row)?, *duty));
-        return Some((
-            path.named("duty"),
-            false,
-            duties.iter().enumerate().filter_map(pair).collect(),
-        ));
+        return Some(Pairs {
+            source: path.named("duty"),
+            derived: false,
+            pairs: duties.iter().enumerate().filter_map(pair).collect(),
+            step: decimal_step(duties.iter().copied()),
+        });
     }
     // what is before a row is the duty of the action in the row before, unless an episode begins
     let behind = |duties: Vec<Option<f64>>| -> Vec<Pair> {
@@ -203,8 +283,12 @@ fn pairs(of: Logged<'_>) -> Option<(String, bool, Vec<Pair>)> {
             .collect()
     };
     if let Some(duties) = &done.previous_duty {
-        let duties = duties.iter().map(|duty| Some(*duty)).collect();
-        return Some((path.named("previous_duty"), false, behind(duties)));
+        return Some(Pairs {
+            source: path.named("previous_duty"),
+            derived: false,
+            step: decimal_step(duties.iter().copied()),
+            pairs: behind(duties.iter().map(|duty| Some(*duty)).collect()),
+        });
     }
     let plain = |index: &usize| {
         let feature = policy.features.get(*index);
@@ -217,7 +301,12 @@ fn pairs(of: Logged<'_>) -> Option<(String, bool, Vec<Pair>)> {
     let (feature, values) = (policy.features.get(index)?, log.observed.get(index)?.as_ref()?);
     let is_clipped = |value: f64| feature.clip.is_some_and(|clip| value <= clip.low || value >= clip.high);
     let duty = |value: &f64| (!is_clipped(*value)).then(|| (value - feature.offset) / feature.scale);
-    Some((feature.name.clone(), true, behind(values.iter().map(duty).collect())))
+    Some(Pairs {
+        source: feature.name.clone(),
+        derived: true,
+        pairs: behind(values.iter().map(duty).collect()),
+        step: decimal_step(values.iter().copied()) / feature.scale.abs(),
+    })
 }
 
 impl DutyResult {
@@ -247,7 +336,14 @@ impl DutyResult {
             let is_said = self.rows > 0 && !self.derived;
             return is_said.then(|| {
                 let unseen = self.unseen();
-                format!("duty of the action equal in {} of {}{unseen}", self.equal, self.rows)
+                let worst = match self.worst > 0.0 {
+                    true => format!(", largest difference {}", number(self.worst)),
+                    false => ", to the last digit".to_owned(),
+                };
+                format!(
+                    "duty of the action equal in {} of {}{worst}{unseen}",
+                    self.equal, self.rows
+                )
             });
         };
         let (others, rows) = (self.rows - self.equal, self.rows);
@@ -256,7 +352,7 @@ impl DutyResult {
             .collect();
         let is_other = |(action, duty): &&(usize, f64)| {
             let own = self.own.get(*action).copied().unwrap_or(f64::NAN);
-            (own - duty).abs() > SAME * duty.abs().max(own.abs())
+            (own - duty).abs() > FINE * duty.abs().max(own.abs())
         };
         let worst = seen.iter().find(is_other).map(|(action, duty)| {
             let own = self.own.get(*action).copied().unwrap_or(f64::NAN);

@@ -29,7 +29,13 @@ fn golden(policy: &Policy) -> Vec<String> {
     let Some(golden) = golden_result(policy) else {
         return vec![unproven(policy)];
     };
-    let mut lines = vec![format!("{} golden vectors: {golden}", golden.vectors)];
+    // how a network was read is asked in floats, whatever format it gets
+    let read = if policy.numeric_format.is_integer() {
+        " in f32"
+    } else {
+        ""
+    };
+    let mut lines = vec![format!("{} golden vectors{read}: {golden}", golden.vectors)];
     if let Some(found) = interp::decisions::decisions(policy, None) {
         lines.extend(decisions(policy, &found));
     }

@@ -210,6 +210,16 @@ fn what_an_action_adds_is_held_against_the_log() {
         code == Some(1) && text.contains("action 2 adds 0.02 in the contract and 0.0203"),
         "{text}"
     );
+    // one row of another duty is one row, whatever the others of its action have
+    let list = duties([-0.02, 0.0, 0.02]);
+    let (code, text) = said(&log(",duty", |row| {
+        let slip = if row == 14 { 0.007 } else { 0.0 };
+        format!(",{:.6}", list[row].1 + slip)
+    }));
+    assert!(
+        code == Some(1) && text.contains("others in 1 of 30 rows, first in line 16"),
+        "{text}"
+    );
     desk.edit("policy/policy.toml", "[-0.02, 0.0, 0.02]", "[-0.008, 0.0, 0.008]");
     let (code, text) = rounded(2, [-0.008, 0.0, 0.008]);
     assert!(code == Some(0) && !text.contains("are others"), "{text}");

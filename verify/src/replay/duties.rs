@@ -14,7 +14,7 @@ const SAME: f64 = 5e-3;
 // a trainer in binary32 is off by a hundredth of it; an offset of .005 that should be .0051 by ten times it
 const FINE: f64 = 1e-5;
 
-/// Standard errors of the mean of an action's rows that are no chance: of a hundred actions none in ten thousand logs.
+/// Standard errors of the median of an action's rows that are no chance: of a hundred actions none in ten thousand logs.
 const SURE: f64 = 5.0;
 
 /// Most actions that are named one by one: a reader takes in no more.
@@ -100,19 +100,28 @@ pub(super) fn duties(of: Logged<'_>, commanded: &[f64]) -> Option<DutyResult> {
     })
 }
 
-/// The actions whose rows differ from the contract alike: their mean is off by more than `allowed` and than the scatter of all rows explains.
+/// The actions whose rows differ from the contract alike: their median is off by more than `allowed` and than the scatter of all rows
+/// explains. A row with another duty, or another action, moves no median.
 fn off_alike(actions: usize, more: &[(usize, f64)], allowed: f64) -> Vec<bool> {
-    let of = |action: usize| more.iter().filter(move |(of, _)| *of == action).map(|(_, more)| *more);
-    let means: Vec<f64> = (0..actions)
-        .map(|action| of(action).sum::<f64>() / of(action).count().max(1) as f64)
-        .collect();
-    let around = |(action, more): &(usize, f64)| means.get(*action).map_or(0.0, |mean| (more - mean) * (more - mean));
-    let scatter = (more.iter().map(around).sum::<f64>() / more.len().max(1) as f64).sqrt();
-    let is_off = |(action, mean): (usize, &f64)| {
-        let rows = of(action).count() as f64;
-        rows > 0.0 && mean.abs() > allowed.max(SURE * scatter / rows.sqrt())
+    let of = |action: usize| -> Vec<f64> {
+        let own = more.iter().filter(|(of, _)| *of == action);
+        own.map(|(_, more)| *more).collect()
     };
-    means.iter().enumerate().map(is_off).collect()
+    let middles: Vec<f64> = (0..actions).map(|action| median(of(action))).collect();
+    let around = |(action, more): &(usize, f64)| middles.get(*action).map_or(0.0, |middle| (more - middle).abs());
+    // of a normal distribution; the median of some rows scatters by a quarter more than their mean
+    let scatter = 1.25 * 1.4826 * median(more.iter().map(around).collect());
+    let is_off = |(action, middle): (usize, &f64)| {
+        let rows = of(action).len() as f64;
+        rows > 0.0 && middle.abs() > allowed.max(SURE * scatter / rows.sqrt())
+    };
+    middles.iter().enumerate().map(is_off).collect()
+}
+
+/// 0 of nothing.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 fn worst(more: impl Iterator<Item = f64>) -> f64 {

@@ -425,7 +425,7 @@ fn notes(found: &Examined, pair: Option<&Pair>) -> Vec<String> {
     // with nothing else to say it is the answer itself
     notes.extend(words::edges(found).filter(|_| found.verdict != Verdict::Consistent || !found.lines.is_empty()));
     notes.extend(words::curves(found));
-    notes.extend(words::pulsed(found));
+    notes.extend(words::pulsed(found).filter(|_| found.verdict != Verdict::Unexplained));
     notes.extend(resistors::note(attribution).filter(|_| found.verdict != Verdict::Unexplained));
     // of what was found: where the model as given is far off, so are the instants of load steps that fit it best
     if found.verdict != Verdict::Unexplained {

@@ -92,7 +92,7 @@ fn what_else_is_wrong_is_found_beside_another_carrier() {
     };
     let found = diagnosed(&bench, &carrier(Carrier::Centre, 0.5), 6);
     let ids: Vec<&str> = found.findings.causes.iter().map(|cause| cause.id).collect();
-    assert_eq!(ids, ["c_wrong", "carrier"]);
+    assert_eq!(ids, ["c_wrong", "carrier"], "{}", found.findings.sentence);
 }
 
 /// What is said before any search.

@@ -129,7 +129,7 @@ pub(super) const L_SATURATION: Cause = Cause {
             "inductance that falls with current",
             &[
                 // the bound is the plant's; it bends from below the usual current to far above, where it is a smaller L
-                knob("saturation", &["inductor.saturation"], Reach::Share(0.99, 0.1)),
+                knob("saturation", &["inductor.saturation"], Reach::Share(0.0, 0.99, 0.1)),
                 knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
             ],
             Search::From(&[&[0.3, 6.0], &[0.3, 12.0], &[0.3, 25.0], &[4.0, 12.0]]),
@@ -138,7 +138,7 @@ pub(super) const L_SATURATION: Cause = Cause {
         searched(
             "inductance that falls with current as that of a powder core",
             &[
-                knob("saturation", &["inductor.saturation"], Reach::Share(0.99, 0.1)),
+                knob("saturation", &["inductor.saturation"], Reach::Share(0.0, 0.99, 0.1)),
                 knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
                 knob("steepness", &["inductor.steepness"], Reach::Plain(0.5, 2.0, 0.1)),
             ],
@@ -149,7 +149,7 @@ pub(super) const L_SATURATION: Cause = Cause {
             "inductance that falls steeply with current",
             &[
                 // a steep core that loses more swings for ever where its current stops, and no settled point of it comes to rest
-                knob("saturation", &["inductor.saturation"], Reach::Share(0.95, 0.1)),
+                knob("saturation", &["inductor.saturation"], Reach::Share(0.0, 0.95, 0.1)),
                 knob("i_sat", &["inductor.i_sat"], Reach::Current(0.3, 8.0, 0.1)),
                 knob("steepness", &["inductor.steepness"], Reach::Plain(1.0, 32.0, 0.5)),
             ],
@@ -165,7 +165,7 @@ pub(super) const C_DERATING: Cause = Cause {
         searched(
             "capacitance that falls with voltage",
             &[
-                knob("derating", &["capacitor.derating"], Reach::Share(1.0, 0.1)),
+                knob("derating", &["capacitor.derating"], Reach::Share(0.0, 1.0, 0.1)),
                 knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 5.0, 0.1)),
             ],
             // at the output's voltage the last four leave .76, .63, .48 and .30, as far apart as those of another part
@@ -179,12 +179,13 @@ pub(super) const C_DERATING: Cause = Cause {
                 &[9.5, 6.0],
             ]),
         ),
-        // a label has a tolerance, and a model may hold what was measured at the output's voltage
+        // a label has a tolerance, and a model may hold what was measured at the output's voltage; a curve so flat that it imitates another
+        // capacitance is left to that cause
         searched(
             "capacitance that falls with voltage from another one at none",
             &[
-                knob("derating", &["capacitor.derating"], Reach::Share(1.0, 0.1)),
-                knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 5.0, 0.1)),
+                knob("derating", &["capacitor.derating"], Reach::Share(0.3, 1.0, 0.1)),
+                knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 2.0, 0.1)),
                 knob("capacitance", &["converter.capacitance"], Reach::Own(0.3, 3.0, 0.02)),
             ],
             // in all they leave .42, .64, .84, 1 and 1.15 of the model's at the output's voltage, twice with a slope as steep as ceramics have

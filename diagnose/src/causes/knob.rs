@@ -40,9 +40,9 @@ pub(crate) enum Reach {
     Time(f64, f64, f64),
     /// As it is.
     Plain(f64, f64, f64),
-    /// The share that a part loses along its curve: highest and step. A part may lose all of it, so that the upper end, close to all, cuts
-    /// nothing off.
-    Share(f64, f64),
+    /// The share that a part loses along its curve: lowest, highest and step. A part may lose all of it, so that the upper end, close to all,
+    /// cuts nothing off.
+    Share(f64, f64, f64),
 }
 
 /// Lags shorter than this share of a period are left out: between samples a period apart they leave no trace (e^-100), and the
@@ -166,8 +166,7 @@ impl Knob {
             Reach::Voltage(low, high, step) => by(bases.v, low, high, step),
             Reach::Current(low, high, step) => by(bases.i, low, high, step),
             Reach::Time(low, high, step) => by(bases.t_sw, low, high, step),
-            Reach::Plain(low, high, step) => [low, high, step],
-            Reach::Share(high, step) => [0.0, high, step],
+            Reach::Plain(low, high, step) | Reach::Share(low, high, step) => [low, high, step],
         }
     }
 }

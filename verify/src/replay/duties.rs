@@ -14,7 +14,7 @@ const SAME: f64 = 5e-3;
 // a trainer in binary32 is off by a hundredth of it; an offset of .005 that should be .0051 by ten times it
 const FINE: f64 = 1e-5;
 
-/// The same where a law of signals stands beside it: their digits are in every duty, five of a log and more.
+/// The same where a law of signals stands beside it, or where a feature tells the duty: their digits are in it, five of a log and more.
 const OF_SIGNALS: f64 = 1e-4;
 
 /// Standard errors of the median of an action's rows that are no chance: of a hundred actions one in 17,000 logs.
@@ -79,7 +79,8 @@ pub(super) fn duties(of: Logged<'_>, commanded: &[f64]) -> Option<DutyResult> {
     let more = |pair: &&Pair| Some((pair.1, pair.2 - own.get(pair.1)?));
     let more: Vec<(usize, f64)> = pairs.iter().filter_map(|pair| more(&pair)).collect();
     let step = unless_written(step, own.iter().copied());
-    let off = off_alike(own.len(), &more, (FINE * largest).max(0.5 * step * 1.001));
+    let share = if derived { OF_SIGNALS } else { FINE };
+    let off = off_alike(own.len(), &more, (share * largest).max(0.5 * step * 1.001));
     let is_other = |(_, action, duty): &&Pair| {
         let is_own = own.get(*action).is_some_and(|own| is_same(*own, *duty));
         !is_own || off.get(*action).copied().unwrap_or(true)
@@ -167,7 +168,7 @@ fn added(of: Logged<'_>, head: &Residual, commanded: &[f64]) -> Option<DutyResul
         .filter(|(_, duty, command)| is_inside(*duty) && is_inside(*command))
         .map(|(action, duty, command)| (action, duty - command))
         .collect();
-    let share = match head.base.tree == Expr::Input(of.path.previous_duty) {
+    let share = match !derived && head.base.tree == Expr::Input(of.path.previous_duty) {
         true => FINE,
         false => OF_SIGNALS,
     };

@@ -18,6 +18,7 @@ use crate::examine::{Examined, examined};
 use crate::findings::{Aside, Verdict};
 use crate::fit::State;
 use crate::gain::{self, Pair};
+use crate::level::threshold;
 use crate::noise;
 use crate::problem::{Problem, dot};
 use crate::progress::{Listener, Progress};
@@ -156,7 +157,10 @@ pub fn explained_without(
         let pair = found.judged(heldout, base);
         let holds = match found.verdict {
             Verdict::Consistent => true,
-            Verdict::Explained | Verdict::Ambiguous => is_borne(&found, part, &whole.problem, records, base),
+            Verdict::Explained | Verdict::Ambiguous => {
+                is_borne(&found, part, &whole.problem, records, base)
+                    && pair.as_ref().is_none_or(|pair| helps(pair, &found))
+            }
             Verdict::MostlyExplained | Verdict::Unexplained => false,
         };
         holds.then_some(Rest { part, found, pair })
@@ -221,6 +225,14 @@ fn may_miss(problem: &Problem, channel: usize) -> bool {
     is_measured(channel) && !is_load && left >= FEWEST_CHANNELS && moves
 }
 
+/// Whether the causes do not make records worse that no fit has seen, by more than chance: what they explain would be something else. An
+/// effect that does not show there leaves them as they are.
+fn helps(pair: &Pair, found: &Examined) -> bool {
+    let (before, after) = (pair.before.chi2, dot(&pair.after.residual, &pair.after.residual));
+    let parameters = found.attribution.best.as_ref().map_or(0, |best| best.values.len());
+    after < before + threshold(parameters, found.attribution.inflation)
+}
+
 /// Whether what was set aside bears the causes, and shows nothing that the converter does and its instruments do not.
 fn is_borne(found: &Examined, part: Part, whole: &Problem, records: &[Record], base: &Model) -> bool {
     let [before, after] = squares(found, part, whole, records, base);
@@ -232,10 +244,11 @@ fn is_kicked(found: &Examined, part: Part, whole: &Problem) -> bool {
     let Part::Channel(n) = part else { return false };
     let (problem, null, state) = with_channel(found, whole, n);
     let left = structures(&problem, &null, &state, found.attribution.inflation);
-    (0..problem.records.len()).any(|index| {
-        let is_left = |one: &Structure| (one.channel, &one.record) == (CHANNEL_NAMES[n], &problem.records[index].name);
-        left.iter().any(is_left) && shape::is_kicked(&problem, &state, (index, n))
-    })
+    let mut kicked = (0..problem.records.len()).filter(|index| {
+        let is_left = |one: &Structure| (one.channel, &one.record) == (CHANNEL_NAMES[n], &problem.records[*index].name);
+        left.iter().any(is_left) && shape::is_kicked(&problem, &state, (*index, n))
+    });
+    kicked.any(|index| !shape::is_missing_elsewhere(&problem, &state, (index, n)))
 }
 
 /// Sums of squares of what was set aside, without and with the causes.

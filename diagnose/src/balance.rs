@@ -44,7 +44,7 @@ fn of(problem: &Problem, record: &Record) -> Option<String> {
     let v: Vec<f64> = points.iter().map(|p| p.0).collect();
     let square = |left: f64| left * left;
     let rms = (left(&columns, &v) / (count - terms as f64)).sqrt();
-    if rms < LEFT * problem.bases.v {
+    if rms < LEFT * problem.bases.v || is_of_counter(&ideal, &points, rms) {
         return None;
     }
     // without its losses a converter is off by some percent
@@ -67,6 +67,45 @@ fn of(problem: &Problem, record: &Record) -> Option<String> {
     Some(format!(
         "no {own} gives the points of {name}, whatever its losses: its voltage is {form}, and theirs is {rms} beside{looks}"
     ))
+}
+
+/// Counts of a period that are tried, as multiples of those whose rounding scatters the voltage by as much as the points are beside.
+const AROUND: [f64; 2] = [0.5, 2.0];
+/// How far apart they are: half of that moves a duty by a hundredth of a count at most, so that of a table hardly one is rounded otherwise.
+const APART: f64 = 0.02;
+/// Change of the duty that tells what it does to the voltage.
+const NUDGE: f64 = 1e-4;
+/// With the rounded duties this share of the error is left at most. Of five points beyond the terms, chi-square falls to a ninth of its mean by
+/// chance once in 200; of nineteen, as of a table of 23 points, once in ten million, and there are thousands of counts.
+const OF_COUNTER: f64 = 1.0 / 3.0;
+/// Fewest points beyond the terms.
+const MORE_FOR_COUNTER: usize = 12;
+
+/// Whether the points are those of a converter whose counter knows few duties: the commanded ones are not what the switch did.
+fn is_of_counter(ideal: &Ideal, points: &[Point], rms: f64) -> bool {
+    let mean = points.iter().map(|p| p.1).sum::<f64>() / points.len().max(1) as f64;
+    let slope = (ideal.volts(mean + NUDGE) - ideal.volts(mean)) / NUDGE;
+    // a duty that is rounded is off by its step over the root of twelve
+    let counts = slope.abs() / (rms * libm::sqrt(12.0));
+    let [low, high] = AROUND.map(|share| share * counts);
+    let tried = (0..=((high - low) / APART) as usize).map(|n| low + n as f64 * APART);
+    let left_by = |counts: f64, cut: f64| {
+        let rounded = |p: &Point| (p.0, libm::floor(p.1 * counts + cut) / counts, p.2);
+        let points: Vec<Point> = points.iter().map(rounded).collect();
+        // no counter leaves a switch on for ever
+        if points.iter().any(|p| p.1 >= 1.0) {
+            return f64::INFINITY;
+        }
+        let columns = columns(ideal.topology, &points);
+        let v: Vec<f64> = points.iter().map(|p| p.0).collect();
+        let free = points.len().saturating_sub(columns.len());
+        match free >= MORE_FOR_COUNTER {
+            true => (left(&columns, &v) / free as f64).sqrt(),
+            false => f64::INFINITY,
+        }
+    };
+    let mut each = tried.flat_map(|counts| [0.0, 0.5].map(|cut| left_by(counts, cut)));
+    each.any(|left| left < OF_COUNTER * rms)
 }
 
 /// A row as a point, where the current never rests.

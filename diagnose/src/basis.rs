@@ -56,7 +56,7 @@ struct Span {
     segment: usize,
     from: usize,
     to: usize,
-    /// Voltage, current, then the instants of the free steps `steps`.
+    /// Voltage, current, what a lagging load draws, then the instants of the free steps `steps`.
     q: Vec<Vec<f64>>,
     /// `r[column][row]` up to the diagonal; 0 where a direction is not seen.
     r: Vec<Vec<f64>>,
@@ -75,11 +75,19 @@ impl Problem {
     /// What initial states can explain, around `starts`; `residual` is that of the model there.
     #[must_use]
     pub fn basis(&self, model: &Model, starts: &Starts, residual: &[f64]) -> Basis {
-        let states: [Vec<f64>; 2] = std::array::from_fn(|state| {
-            let step = NUDGE * [self.bases.v, self.bases.i][state];
+        let states: [Vec<f64>; 3] = std::array::from_fn(|state| {
+            let step = NUDGE * [self.bases.v, self.bases.i, self.bases.i][state];
             let mut moved = starts.clone();
-            for start in moved.states.iter_mut().flatten() {
-                start[state] += step;
+            if state == DRAWN && !self.may_be_drawing(model) {
+                return vec![0.0; residual.len()];
+            }
+            for of_record in &mut moved.states {
+                // a record begins at rest, or where its table begins to say what was drawn
+                let skipped = usize::from(state == DRAWN);
+                of_record
+                    .iter_mut()
+                    .skip(skipped)
+                    .for_each(|start| start[state] += step);
             }
             let after = self.residual(model, &moved);
             residual
@@ -115,6 +123,14 @@ impl Problem {
             basis.add(Unknown::Trim, raw);
         }
         basis
+    }
+
+    /// Whether a load of constant power that lags may be on its way where a segment begins: behind lost rows nobody knows what it drew last.
+    fn may_be_drawing(&self, model: &Model) -> bool {
+        let has_gaps = |record: &Record| !record.settled && record.segments.len() > 1;
+        let has_power = |record: &Record| record.load.iter().any(|load| load.power > 0.0);
+        model.plant.load.cpl_time_constant > 0.0
+            && (self.records.iter()).any(|record| has_gaps(record) && has_power(record))
     }
 
     /// Sensitivity to each free level of a load, a standard deviation.
@@ -199,8 +215,9 @@ impl Moving {
     pub const EACH: [Moving; 2] = [Moving::All, Moving::AllButCurrents];
 }
 
-/// Place of the initial current among the columns of a span.
+/// Places of the initial current and of what a lagging load draws among the columns of a span.
 const CURRENT: usize = 1;
+const DRAWN: usize = 2;
 
 impl Span {
     /// Takes a column in: what the others before it do not hold, at length 1.
@@ -296,7 +313,8 @@ impl Basis {
             let start = &mut starts.states[span.record][span.segment];
             start[0] = (start[0] + moves[0]).max(0.0);
             start[1] += moves[1];
-            for (place, by) in span.steps.iter().zip(&moves[2..]) {
+            start[2] += moves[2];
+            for (place, by) in span.steps.iter().zip(&moves[3..]) {
                 let late = &mut starts.late[span.record][*place];
                 *late = (*late + by).clamp(-FARTHEST, FARTHEST);
             }

@@ -25,8 +25,8 @@ const AVERAGED: f64 = 100.0;
 /// Two instants closer than this share of a period are one: 0.1 ps at 10 kHz, far above the rounding of sums of periods.
 const SAME: f64 = 1e-9;
 
-/// Output voltage and inductor current at the first row of a segment.
-pub type Start = [f64; 2];
+/// Output voltage and inductor current at the first row of a segment, and what a load of constant power that lags draws there beyond its power.
+pub type Start = [f64; 3];
 
 /// What is estimated of one record beside every fit.
 #[derive(Debug, Clone, Copy)]
@@ -217,6 +217,7 @@ impl Driver<'_> {
         let mut history = vec![duty[0]; HISTORY.saturating_sub(given)];
         history.extend_from_slice(&duty[given.saturating_sub(plant.looks_back())..given]);
         let sample = plant.reset_within(start[0], start[1], &load[first], &history);
+        plant.draws_more(start[2]);
         // a slow sensor begins where it was, not at the signal of this instant
         plant.shows(std::array::from_fn(|n| self.record.measured[n][segment.start]));
         shown[segment.start] = array(&sample.measured);

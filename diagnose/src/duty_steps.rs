@@ -135,8 +135,8 @@ const FEW_LEVELS: usize = 64;
 
 /// The duties of all records, each once, and which share of the rows has it.
 fn levels(problem: &Problem) -> Vec<(f64, f64)> {
-    let records = problem.records.iter().filter(|record| !record.settled);
-    let mut duties: Vec<f64> = records.flat_map(|record| record.duty.iter().copied()).collect();
+    let all = problem.records.iter().flat_map(|record| &record.duty);
+    let mut duties: Vec<f64> = all.copied().collect();
     duties.sort_by(f64::total_cmp);
     let row = 1.0 / duties.len().max(1) as f64;
     let mut levels: Vec<(f64, f64)> = Vec::new();
@@ -192,7 +192,15 @@ fn pieces(problem: &Problem, numbers: &[f64], cut: Cut) -> Vec<Range<usize>> {
 /// Change of the signals over their noise when each duty is `moved` by so much.
 fn response(problem: &Problem, plant: &Parameters, moved: &(dyn Fn(f64) -> f64 + Sync)) -> Vec<f64> {
     let mut out = vec![0.0; problem.len()];
-    for (record, offset) in problem.records.iter().zip(&problem.offsets).filter(|(r, _)| !r.settled) {
+    for (record, offset) in problem.records.iter().zip(&problem.offsets) {
+        if record.settled {
+            for row in 0..record.rows() {
+                let [v, i] = settled((problem, plant), (record, row), moved(record.duty[row]));
+                out[offset + row * CHANNELS] = v / problem.sigma[0];
+                out[offset + row * CHANNELS + 1] = i / problem.sigma[1];
+            }
+            continue;
+        }
         for segment in &record.segments {
             let (mut v, mut i) = (0.0, 0.0);
             for row in segment.clone() {
@@ -207,6 +215,24 @@ fn response(problem: &Problem, plant: &Parameters, moved: &(dyn Fn(f64) -> f64 +
         }
     }
     out
+}
+
+/// Change of the duty that tells what it does to a settled voltage.
+const NUDGE: f64 = 1e-4;
+
+/// What a settled point's voltage and inductor current change by where its duty is `moved`, without losses and in continuous conduction.
+fn settled((problem, p): (&Problem, &Parameters), (record, row): (&Record, usize), moved: f64) -> [f64; 2] {
+    let (topology, duty) = (p.converter.topology, record.duty[row].min(1.0 - 2.0 * NUDGE));
+    let v_in = p.converter.v_in * record.v_in_ratio;
+    let rest = |duty: f64| {
+        let v = topology.voltage(v_in, duty);
+        let load = &record.load[row];
+        // around the voltage at hand: a constant power draws less where that rises
+        let drawn = load.conductance * v - load.power * (v - problem.bases.v) / (problem.bases.v * problem.bases.v);
+        [v, drawn / topology.give(duty).max(GIVE)]
+    };
+    let ([v, i], [v_up, i_up]) = (rest(duty), rest(duty + NUDGE));
+    [(v_up - v) / NUDGE * moved, (i_up - i) / NUDGE * moved]
 }
 
 /// Least share of the current that an output receives: a duty of nearly 1 would make the current of a boost large without bound.

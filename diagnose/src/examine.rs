@@ -82,10 +82,16 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
     odd.extend((attribution.leave_out_coloured(&problem, beside_line)).into_iter().map(|id| {
         format!("{id} would fit a little better: not named, since a rhythm, or other noise that is not white, lends it as much")
     }));
-    instants::note(&mut problem, &attribution.state().starts);
     unsure_levels::note(&mut problem, attribution.state());
     // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
+    // causes that explain nothing bend the instants as well
+    let told = if structure.is_empty() {
+        attribution.state()
+    } else {
+        &attribution.null
+    };
+    instants::note(&mut problem, &told.starts);
     let lines = beside(
         fast::structures(&problem, &attribution.null, attribution.state()),
         &structure,
@@ -99,6 +105,9 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
     }
     let named = named(&attribution, &profiles);
     let mut doubts = doubts::of(&problem, &attribution, &profiles, &structure);
+    if let Some(fault) = rows_ahead(&problem, &misread, &named) {
+        return Examined::misread(problem, attribution.null, outliers, fault);
+    }
     if !structure.is_empty() || doubts::forbids(&named, &doubts) {
         // where no cause explains the records the other reading is what there is to say
         doubts.extend(odd_readings(&misread));
@@ -123,6 +132,15 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
         outliers,
         odd,
     }
+}
+
+/// The shift of the rows that a sampling instant which explains the records is nothing but.
+fn rows_ahead(problem: &Problem, misread: &[Misread], named: &[Named]) -> Option<String> {
+    // beside it a cause may have taken up what the last row lost
+    let sampled = named.iter().find(|cause| cause.id == "sampling_delay")?;
+    let late = sampled.parameters.get("delay")?;
+    let is_ahead = preflight::is_rows_ahead(problem, misread, late.value / problem.bases.t_sw);
+    misread.first().filter(|_| is_ahead).map(|one| one.words.clone())
 }
 
 /// Other readings as doubts.

@@ -1,6 +1,6 @@
 //! What a record's converter shows at rest without losses, in continuous conduction: sizes to judge by, before any simulation.
 
-use plant::{Load, Parameters, Topology};
+use plant::{Carrier, Load, Parameters, Topology};
 
 use crate::record::Record;
 
@@ -60,6 +60,31 @@ impl Ideal {
             Topology::Boost | Topology::BuckBoost => self.v_in * duty,
         };
         0.5 * volts / self.slope
+    }
+
+    /// How far the inductor current is above what a sensor with a low-pass of `tau` seconds shows of it at rest, at the sampling instant `phase`
+    /// of a period of `t_sw` seconds: behind a steep ripple a sensor shows another current than flows. For a current that never rests.
+    // for a line of slope s the sensor is tau s behind, but for what is left of the corner before it, which fades with tau: e at the two
+    // corners follows from e(on) = e(off) b + step and e(off) = e(on) a - step, where tau s leaps by step
+    pub fn above_shown(&self, (carrier, duty): (Carrier, f64), phase: f64, tau: f64, t_sw: f64) -> f64 {
+        let lasts = [duty, 1.0 - duty].map(|share| share * t_sw);
+        if tau <= 0.0 || lasts.iter().any(|time| *time <= 0.0) {
+            return 0.0;
+        }
+        let slopes = [2.0 * self.half(duty) / lasts[0], -2.0 * self.half(duty) / lasts[1]];
+        let begins = match carrier {
+            Carrier::Trailing => 0.0,
+            Carrier::Leading => 1.0 - duty,
+            Carrier::Centre => 0.5 * (1.0 - duty),
+        };
+        let since = (phase - begins).rem_euclid(1.0) * t_sw;
+        let fades = lasts.map(|time| libm::exp(-time / tau));
+        let step = tau * (slopes[0] - slopes[1]) / (1.0 - fades[0] * fades[1]);
+        let (slope, corner, since) = match since < lasts[0] {
+            true => (slopes[0], step * (1.0 - fades[1]), since),
+            false => (slopes[1], -step * (1.0 - fades[0]), since - lasts[0]),
+        };
+        tau * slope - corner * libm::exp(-since / tau)
     }
 
     /// Whether the inductor current surely never rests: a voltage then follows from the duty alone.

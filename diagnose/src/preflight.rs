@@ -57,17 +57,25 @@ pub struct Misread {
     /// What it looks like, and what mends it.
     pub words: String,
     reading: Reading,
-    /// Nothing but noise is left in this reading, and no cause of the list does the same.
-    is_sure: bool,
+    /// Nothing but noise is left in this reading.
+    is_clean: bool,
     /// No cause of the list does the same.
     is_no_cause: bool,
 }
 
 impl Misread {
+    /// Rows by which the samples belong to later rows than theirs; nothing if they do not.
+    fn ahead(&self) -> Option<f64> {
+        match self.reading {
+            Reading::Shifted(by) if by < 0 => Some(-by as f64),
+            _ => None,
+        }
+    }
+
     /// Whether a cause that explains the records speaks against it: the record cannot be both.
     #[must_use]
     pub fn is_refuted_by_a_cause(&self) -> bool {
-        self.is_no_cause && !self.is_sure
+        self.is_no_cause && !self.is_clean
     }
 }
 
@@ -182,8 +190,20 @@ pub fn readings(problem: &Problem, null: &State) -> Vec<Misread> {
 /// The fault that answers for all records: each is misread in the same way, and nothing but noise is left in that reading.
 pub fn answer(problem: &Problem, misread: &[Misread]) -> Option<String> {
     let first = misread.first()?;
-    let same = |one: &Misread| one.is_sure && one.reading == first.reading;
+    let same = |one: &Misread| one.is_clean && one.is_no_cause && one.reading == first.reading;
     (misread.len() == problem.records.len() && misread.iter().all(same)).then(|| first.words.clone())
+}
+
+/// A delay this near to whole periods, in periods, is one of whole rows.
+// the step that counts as one for a sampling instant
+const WHOLE: f64 = 0.02;
+
+/// Whether a sampling instant that was found, periods late, is nothing but rows: all records show what their converter does whole rows later and
+/// nothing else, and no instrument does that. What is older than its row an instrument may have held back.
+pub fn is_rows_ahead(problem: &Problem, misread: &[Misread], late: f64) -> bool {
+    let all = misread.len() == problem.records.len() && !misread.is_empty();
+    let is_it = |one: &Misread| one.is_clean && one.ahead().is_some_and(|rows| (late - rows).abs() < WHOLE);
+    all && misread.iter().all(is_it)
 }
 
 /// Rows of a record in which readings are compared first: more only cost time where these tell.
@@ -239,7 +259,7 @@ fn best_reading(problem: &Problem, null: &State, index: usize) -> Option<Misread
     (left < LEFT * as_it_is).then(|| Misread {
         words: reading.words(whole, &null.model),
         reading,
-        is_sure: left < WRONG && is_no_cause,
+        is_clean: left < WRONG,
         is_no_cause,
     })
 }

@@ -252,11 +252,23 @@ impl Problem {
         let v = near(0).unwrap_or_else(|| ideal.volts(duty));
         let drawn = ideal.inductor(ideal::drawn(&record.load[row], v), duty);
         let i = near(1)
+            .map(|shown| shown + self.behind_sensor(record, row, drawn))
             .or_else(|| Some(ideal.inductor(near(2)?, duty)))
             .unwrap_or(drawn);
         // without bound where no steady state is
         let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
-        [finite(v.max(0.0)), finite(if record.settled { drawn } else { i })]
+        [finite(v.max(0.0)), finite(if record.settled { drawn } else { i }), 0.0]
+    }
+
+    /// How far the inductor current is above what its sensor shows in a row at which it delivers `mean`; 0 where it may rest.
+    fn behind_sensor(&self, record: &Record, row: usize, mean: f64) -> f64 {
+        let (p, duty) = (&self.base.plant, record.duty[row]);
+        let ideal = Ideal::of(record, p);
+        let is_raw = record.is_true[1] || record.duty_is == DutyIs::Direct;
+        if is_raw || record.settled || mean <= ideal.half(duty) {
+            return 0.0;
+        }
+        ideal.above_shown((p.pwm.carrier, duty), record.phase, p.sensors.i_l.low_pass, p.t_sw())
     }
 
     /// Whether a value counts.

@@ -116,7 +116,12 @@ fn of_best(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> (
         let sigma = (best.covariance[*number][*number] * attribution.inflation).sqrt();
         let [low, high, step] = fitter.range(place);
         // where the fit held it at an end, or had no slope, its own step is the scale at which other values are tried
-        let sigma = if sigma > 0.0 { sigma } else { step };
+        let sigma = match sigma > 0.0 {
+            // a tangent next to that of the trim: what the two differ by is their curvature, and tells the covariance too much
+            true if candidate.is_of_edges() => sigma.max(step),
+            true => sigma,
+            false => step,
+        };
         let lower: RefCell<Option<Fit>> = RefCell::new(None);
         let at_value = |x: f64| {
             let mut values = best.values.clone();

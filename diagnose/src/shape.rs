@@ -1,7 +1,8 @@
 //! What a residual looks like that no cause explains.
 
+mod swing;
+
 use crate::capture::left;
-use crate::fast;
 use crate::fit::State;
 use crate::flicker;
 use crate::ideal::{self, Ideal};
@@ -12,6 +13,7 @@ use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, Record};
 use crate::small;
 use crate::spectrum::{Line, strongest_line};
 use crate::words::si;
+pub(crate) use swing::{is_kicked, is_missing_elsewhere};
 
 /// Structure is seen where block means scatter this much more than white noise of the same size would let them: twice as much,
 /// however many blocks there are. Real noise is never quite white; a convention.
@@ -104,7 +106,7 @@ fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &
             100.0 * share
         );
     }
-    let place = place(problem, record, values, excess);
+    let place = place(problem, state, (index, n), (values, excess));
     let of_line = |line: &Line| 0.5 * count * (line.amplitude / problem.sigma[n]).powi(2) / excess;
     let (course, words) = followed(problem, (index, n), values);
     let line = strongest_line(problem, &state.residual, n).filter(|line| {
@@ -132,42 +134,16 @@ fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &
 }
 
 /// Where what is left lies, if it lies at places in time or in a band.
-fn place(problem: &Problem, record: &Record, values: &[f64], excess: f64) -> Option<String> {
-    let trembles = || {
-        let share = trembling(problem, values, excess)?;
-        if dies_away(record, values) {
-            let share = 100.0 * share;
-            return Some(format!(
-                "a swing at about the frequency of the filter ({share:.0} % of what is not noise), largest behind steps of duty and load"
-            ));
-        }
-        Some(format!(
-            "a trembling at about the frequency at which the filter swings ({:.0} % of what is not noise), without steps before it: edges that \
-             jitter or pulses that are lost kick it at random",
-            100.0 * share
-        ))
-    };
+fn place(
+    problem: &Problem,
+    state: &State,
+    (index, n): (usize, usize),
+    (values, excess): (&[f64], f64),
+) -> Option<String> {
+    let record = &problem.records[index];
     behind_steps(problem, record, values, excess)
         .or_else(|| kicks(record, values, excess))
-        .or_else(trembles)
-}
-
-/// Whether most of what is left in a channel swings as the filter does, all the time and at no one frequency: something kicks the converter
-/// itself, and its instrument is as good as others.
-#[must_use]
-pub(crate) fn is_kicked(problem: &Problem, state: &State, (index, n): (usize, usize)) -> bool {
-    let (record, values) = (&problem.records[index], channel(problem, &state.residual, index, n));
-    let total: f64 = values.iter().map(|v| v * v).sum();
-    let count = values.iter().filter(|v| **v != 0.0).count() as f64;
-    let excess = total - count;
-    let of_line = |share: f64| share * total / excess;
-    excess > 0.0
-        && burst(&values, total).is_none()
-        && behind_steps(problem, record, &values, excess).is_none()
-        && kicks(record, &values, excess).is_none()
-        && !dies_away(record, &values)
-        && trembling(problem, &values, excess).is_some()
-        && strongest_line(problem, &state.residual, n).is_none_or(|line| of_line(line.share) < OF_EXCESS)
+        .or_else(|| swing::words(problem, state, (index, n), (values, excess)))
 }
 
 /// Turns of a line that a record has to hold: of fewer any bend of a course is one, and a line has to explain so much more than the course.
@@ -186,24 +162,6 @@ const SWINGS: f64 = 1.5;
 fn is_stepped(record: &Record, row: usize) -> bool {
     let from = row.saturating_sub(2 * BLOCK).max(1);
     (from..(row + BLOCK).min(record.rows())).any(|row| !record.is_same_point(row, row - 1))
-}
-
-/// Times as much right behind the steps as later, from which on steps begin what swings: noise of 100 rows reaches 1.3.
-const DIES: f64 = 1.6;
-
-/// Whether what swings is larger in the rows right behind steps of duty and load than in as many that are farther from them.
-fn dies_away(record: &Record, values: &[f64]) -> bool {
-    let mut since = None;
-    let mut rows: Vec<(usize, f64)> = Vec::new();
-    for (row, value) in values.iter().enumerate() {
-        let is_step = row > 0 && !record.is_same_point(row, row - 1);
-        since = if is_step { Some(0) } else { since.map(|n: usize| n + 1) };
-        rows.extend(since.filter(|_| *value != 0.0).map(|n| (n, value * value - 1.0)));
-    }
-    rows.sort_by_key(|(since, _)| *since);
-    let (near, far) = rows.split_at(rows.len() / 2);
-    let sum = |part: &[(usize, f64)]| part.iter().map(|(_, excess)| excess).sum::<f64>();
-    sum(near) > DIES * sum(far).max(f64::MIN_POSITIVE)
 }
 
 /// What is left behind steps of duty and load alone, and behind which of them.
@@ -276,22 +234,6 @@ fn kicks(record: &Record, values: &[f64], excess: f64) -> Option<String> {
             places.join(", ")
         )
     })
-}
-
-/// Share of the filter's frequency to either side that counts as about it.
-const ABOUT: f64 = 0.5;
-/// A trembling holds this share of what is left: more than half.
-const OF_TREMBLING: f64 = 0.6;
-
-/// The share of what is left that lies about the frequency of the filter, if that is most of it.
-fn trembling(problem: &Problem, values: &[f64], excess: f64) -> Option<f64> {
-    let own = Ideal::at(&problem.base.plant, 1.0).swing().recip();
-    let near = fast::band(values, own * (1.0 - ABOUT), own * (1.0 + ABOUT));
-    // white noise of this band, of power 1, is in it
-    let count = values.iter().filter(|v| **v != 0.0).count() as f64;
-    // the band is 2 ABOUT own of the half of the rate that there is
-    let share = (near - 4.0 * ABOUT * own * count).max(0.0) / excess;
-    (share > OF_TREMBLING && own * (values.len() as f64) > 4.0).then_some(share.min(1.0))
 }
 
 /// Correlation from which on one course follows another: a third of the one's square comes from the other.

@@ -2,6 +2,7 @@
 
 use plant::Topology;
 
+use crate::causes::CURVES;
 use crate::doubts;
 use crate::examine::Examined;
 use crate::findings::{Aside, Named, Verdict};
@@ -84,9 +85,6 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>, left:
 /// takes away look like lost pulses or jitter without it.
 // the fifth verdict asks for as much
 pub const MOST_OF_IT: f64 = 0.9;
-
-/// Causes that are a curve of a part, of which the plant has one law.
-const CURVES: [&str; 2] = ["l_saturation", "c_derating"];
 
 /// What is left, channel by channel.
 fn shapes(structure: &[Structure]) -> String {

@@ -218,6 +218,45 @@ fn a_cause_beside_a_disturbed_channel_is_named_and_the_channel_shown() {
 }
 
 #[test]
+fn a_current_probe_that_sticks_while_the_filter_rings_is_an_instrument() {
+    // hardly damped: what the probe leaves of the current swings as the filter does, and the voltage has nothing of it
+    let bench = Bench {
+        v_in: 90.0,
+        inductance: 110e-6,
+        capacitance: 5.6e-6,
+        f_sw: 100e3,
+        dcr: 0.3,
+        ..Bench::default()
+    };
+    let model = bench::of(&Bench {
+        dcr: 0.04,
+        ..bench.clone()
+    });
+    let mut random = Noise(83);
+    let tables = runs(&bench).map(|mut table| {
+        let shown = table.column("i_l");
+        let mut play = shown[0];
+        for value in shown {
+            play = play.clamp(*value - 0.2, *value + 0.2);
+            *value = play;
+        }
+        let noise = [("v_out", 0.02, 0.01), ("i_l", 0.02, 2e-3), ("i_out", 0.02, 2e-3)];
+        table.measured(&noise, &mut random).without(&["v_in"])
+    });
+    let read = |n: usize| tables[n].read(["duty", "load", "held"][n], &model).unwrap();
+    let findings = diagnose(&model, vec![read(0), read(1)], &[read(2)], &|_| ()).findings;
+    let sentence = &findings.sentence;
+    let ids: Vec<&str> = findings.causes.iter().map(|cause| cause.id).collect();
+    assert_eq!(
+        (findings.verdict, &ids[..]),
+        (Verdict::MostlyExplained, &["dcr"][..]),
+        "{sentence}"
+    );
+    assert!(sentence.starts_with("Without i_l this is explained"), "{sentence}");
+    assert!(!sentence.contains("kick"), "{sentence}");
+}
+
+#[test]
 fn where_the_model_explains_all_but_a_channel_no_cause_is_named() {
     let findings = diagnosed(&Bench::default(), Some((1, Odd::Walk)), &mut Noise(78)).findings;
     assert_eq!(findings.verdict, Verdict::Unexplained, "{}", findings.sentence);

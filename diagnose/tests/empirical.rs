@@ -187,8 +187,8 @@ fn a_segment_begins_with_the_rate_that_the_duties_before_it_left() {
     let mut p = model();
     (p.empirical.rate, p.empirical.rate_span, p.empirical.rate_time) = (0.05, 0.1, 17.0 * p.t_sw());
     let mut record = run(&bench(), STRAIGHT, &mut Noise(8)).read("a", &p).unwrap();
-    let begun = [record.measured[0][0], record.measured[1][0]];
-    let simulated = |record: &Record, states: &[[f64; 2]]| {
+    let begun = [record.measured[0][0], record.measured[1][0], 0.0];
+    let simulated = |record: &Record, states: &[[f64; 3]]| {
         let begin = Begin {
             states,
             levels: &[],
@@ -204,7 +204,7 @@ fn a_segment_begins_with_the_rate_that_the_duties_before_it_left() {
         .unwrap();
     let (cut, end) = (step + 10, record.segments[0].end);
     record.segments = vec![Segment { start: 0, end: cut }, Segment { start: cut, end }];
-    let parts = simulated(&record, &[begun, [whole[cut][0], whole[cut][1]]]);
+    let parts = simulated(&record, &[begun, [whole[cut][0], whole[cut][1], 0.0]]);
     let apart = (cut..end).map(|row| (whole[row][0] - parts[row][0]).abs());
     let most = apart.fold(0.0, f64::max);
     // a segment begins with the current and the voltage of the instant, and not with where its gates were to the last nanosecond; the

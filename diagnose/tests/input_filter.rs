@@ -44,6 +44,14 @@ const LONG: Leads = Leads {
     esr_in: 0.012,
 };
 
+/// Thin leads: what swings is damped before anything stands out of the records.
+const THIN: Leads = Leads {
+    resistance: 0.6,
+    inductance: 2.2e-6,
+    c_in: 10e-6,
+    esr_in: 0.05,
+};
+
 /// Inductor current, output capacitor, input capacitor, current of the leads.
 type X = [f64; 4];
 
@@ -150,8 +158,9 @@ fn the_values_of_an_input_filter_lie_in_their_intervals_with_and_without_inducta
         missed(SHORT, &["source.inductance"], 205),
         missed(LONG, &[], 305),
         missed(LONG, &[], 405),
+        missed(THIN, &[], 505),
     ];
     let (out, all) = runs.iter().fold((0, 0), |sum, run| (sum.0 + run.0, sum.1 + run.1));
-    // 95 % of seventeen leave one out in six runs of ten, and more than two in one of twenty
-    assert!(all >= 17 && out <= 2, "{runs:?}");
+    // 95 % of twenty-one leave one out in two runs of three, and more than two in one of eleven
+    assert!(all >= 21 && out <= 2, "{runs:?}");
 }

@@ -242,6 +242,36 @@ fn read(name: &str, table: &Table) -> Record {
 }
 
 #[test]
+fn columns_a_row_ahead_are_no_sampling_instant_and_columns_a_row_behind_may_be_one() {
+    let mut random = Noise(31);
+    let mut found = |by: isize| {
+        let records = ["a", "b"].map(|name| read(name, &shifted(clean(&mut random), by)));
+        diagnose::diagnosis::diagnose(&model(), records.to_vec(), &[], &|_| ()).findings
+    };
+    let ahead = found(-1);
+    assert_eq!(
+        ahead.verdict,
+        diagnose::findings::Verdict::Unexplained,
+        "{}",
+        ahead.sentence
+    );
+    assert!(
+        ahead.causes.is_empty() && ahead.sentence.contains("looks shifted by 1 row"),
+        "{}",
+        ahead.sentence
+    );
+    // what is a period old an instrument may have held back
+    let behind = found(1);
+    let ids: Vec<&str> = behind.causes.iter().map(|cause| cause.id).collect();
+    assert!(!ids.is_empty(), "{}", behind.sentence);
+    assert!(
+        ["sampling_delay", "sensor_delay", "duty_delay"].contains(&ids[0]),
+        "{}",
+        behind.sentence
+    );
+}
+
+#[test]
 fn a_held_out_record_at_another_source_is_named_with_its_map() {
     let mut random = Noise(23);
     let train = [read("first", &clean(&mut random))];

@@ -96,6 +96,43 @@ fn what_else_is_wrong_is_found_beside_another_carrier() {
 }
 
 /// What is said before any search.
+#[test]
+fn samples_a_period_and_more_too_old_are_the_sampling_instant() {
+    // the table's rows are those of the period before, and the trigger comes early beside that
+    for (rows, sampled) in [(1, 0.36), (1, 0.75), (0, 0.9)] {
+        let bench = Bench {
+            sampled,
+            ..Bench::default()
+        };
+        let mut random = Noise(61);
+        let tables = [0, 1].map(|_| {
+            let mut table = stepped(&bench, &mut random);
+            let whole = table.rows();
+            // the logger believes in the middle of the period
+            let off = (0.5 - sampled) / bench.f_sw;
+            table.column("t").iter_mut().for_each(|t| *t += off);
+            for (name, values) in &mut table.0 {
+                // duty and load belong to the row; what was measured is older
+                let is_measured = ["v_out", "i_l", "i_out", "v_in"].contains(&name.as_str());
+                *values = if is_measured {
+                    values[..whole - rows].to_vec()
+                } else {
+                    values[rows..].to_vec()
+                };
+            }
+            table
+        });
+        let plant = carrier(Carrier::Centre, 0.5);
+        let records = tables.iter().map(|table| table.read("run", &plant).unwrap());
+        let findings = diagnose(&plant, records.collect(), &[], &|_| ()).findings;
+        let ids: Vec<&str> = findings.causes.iter().map(|cause| cause.id).collect();
+        assert_eq!(ids, ["sampling_delay"], "{}", findings.sentence);
+        let delay = &findings.causes[0].parameters["delay"];
+        let truth = (sampled - 0.5 - rows as f64) / bench.f_sw;
+        assert!(delay.low <= truth && truth <= delay.high, "{truth} {delay:?}");
+    }
+}
+
 fn looked(table: &Table, plant: &Parameters) -> Option<Timing> {
     let base = Model::new(plant);
     let mut problem = Problem::new(vec![table.read("run", plant).unwrap()], base.clone());

@@ -181,6 +181,13 @@ impl Full {
         }
     }
 
+    /// Lets a load whose constant power lags draw more than at rest, A.
+    pub fn draw_more(&self, x: &mut States, current: f64) {
+        if self.has_lag {
+            x[I_CPL] += current;
+        }
+    }
+
     /// The four low-passes.
     pub fn filtered(x: &States) -> [f64; 4] {
         [x[SHOWN], x[SHOWN + 1], x[SHOWN + 2], x[SHOWN + 3]]

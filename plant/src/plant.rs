@@ -204,6 +204,12 @@ impl Plant {
         Full::hold_filtered(&mut self.state.x, std::array::from_fn(before));
     }
 
+    /// After [`Plant::reset_within`]: what a load of constant power that lags draws beyond its power at that instant, A. Behind a step that
+    /// nobody has seen it has not come to rest; without a lag nothing changes.
+    pub fn draws_more(&mut self, current: f64) {
+        self.full.draw_more(&mut self.state.x, current);
+    }
+
     /// One control period with `duty` (commanded now, clamped to 0..1) under `load`.
     ///
     /// The duty acts from the next start of a PWM period, which is now if the plant is sampled there, plus

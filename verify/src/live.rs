@@ -159,9 +159,14 @@ impl Live {
 }
 
 /// Ctrl-C is the caller's business, not the program's.
+#[cfg(unix)]
 fn apart(mut command: Command) -> Command {
-    #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    command
+}
+
+#[cfg(not(unix))]
+fn apart(command: Command) -> Command {
     command
 }
 

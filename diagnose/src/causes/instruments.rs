@@ -9,8 +9,8 @@ use super::{Cause, Kind, Search};
 // shows both
 const SLOW: Search = Search::OwnOr(&[&[10.0]]);
 const SLOW_APART: Search = Search::OwnOr(&[&[10.0, 10.0], &[0.0, 10.0]]);
-// as far as a sample in the middle of a period reaches behind a step at its start
-const OLD: Search = Search::OwnOr(&[&[35.0]]);
+// as far as a sample in the middle of a period reaches behind a step at its start, and into the period before
+const OLD: Search = Search::OwnOr(&[&[35.0], &[65.0]]);
 
 pub(super) const SENSOR_LOW_PASS: Cause = Cause {
     id: "sensor_low_pass",
@@ -91,13 +91,15 @@ pub(super) const SENSOR_DELAY: Cause = Cause {
     kind: Kind::Instrument,
     // of all sensors together it is the sampling instant; of one, an instrument or an isolated converter of its own
     forms: &[
-        form(
+        searched(
             "delay of the voltage sensor",
             &[knob("delay_v", &["sensors.v_out.delay"], AGE)],
+            OLD,
         ),
-        form(
+        searched(
             "delay of the inductor current sensor",
             &[knob("delay_i", &["sensors.i_l.delay"], AGE)],
+            OLD,
         ),
         searched(
             "delay of the load current sensor",
@@ -119,8 +121,18 @@ pub(super) const SAMPLING_DELAY: Cause = Cause {
         "sampling instant",
         // below two periods: from there on it is rows that are shifted
         &[knob("delay", &[], Reach::Time(-1.9, 1.9, 0.02))],
-        // a quarter of a period to either side, and 0.7 later: the response bends where the instant passes an edge
-        Search::From(&[&[0.0], &[-12.0], &[12.0], &[35.0]]),
+        // half a period apart over all that is tried: the response bends where the instant passes an edge
+        Search::From(&[
+            &[0.0],
+            &[-12.0],
+            &[12.0],
+            &[-35.0],
+            &[35.0],
+            &[-60.0],
+            &[60.0],
+            &[-85.0],
+            &[85.0],
+        ]),
     )],
 };
 

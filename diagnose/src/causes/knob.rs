@@ -22,8 +22,9 @@ pub(crate) enum Reach {
     Own(f64, f64, f64),
     /// In units of v / i: highest and step.
     Resistance(f64, f64),
-    /// In units of v / i: lowest, highest and step.
-    ResistanceFrom(f64, f64, f64),
+    /// Of the source, in units of v / i, or of 0.4 v_in^2 / (v i) where that is more: of what the converter is to its source, which the load
+    /// is behind a converter that steps far down. Lowest, highest and step.
+    SourceResistance(f64, f64, f64),
     /// In units of t_sw i / v.
     Capacitance(f64, f64, f64),
     /// In units of t_sw v / i.
@@ -48,6 +49,10 @@ pub(crate) enum Reach {
 /// Lags shorter than this share of a period are left out: between samples a period apart they leave no trace (e^-100), and the
 /// integrator would take 400 steps a period for them.
 const NO_LAG: f64 = 0.01;
+
+/// Share of what the converter is to its source that makes one unit of the source's resistance: half of it takes a fifth of the source's
+/// voltage, as half of the load's resistance takes a third of the output's.
+const SEEN: f64 = 0.4;
 
 /// One parameter of a cause.
 #[derive(Debug, Clone, Copy)]
@@ -158,7 +163,10 @@ impl Knob {
             // for numbers that every converter has: shares of a 0 would leave no room
             Reach::Own(low, high, step) => by(own, low, high, step),
             Reach::Resistance(high, step) => by(bases.v / bases.i, 0.0, high, step),
-            Reach::ResistanceFrom(low, high, step) => by(bases.v / bases.i, low, high, step),
+            Reach::SourceResistance(low, high, step) => {
+                let seen = bases.v_in * bases.v_in / (bases.v * bases.i);
+                by((bases.v / bases.i).max(SEEN * seen), low, high, step)
+            }
             Reach::Capacitance(low, high, step) => by(bases.t_sw * bases.i / bases.v, low, high, step),
             Reach::Inductance(low, high, step) => by(bases.t_sw * bases.v / bases.i, low, high, step),
             Reach::Conductance(high, step) => by(bases.i / bases.v, 0.0, high, step),

@@ -35,6 +35,9 @@ const EDGES: [&str; 4] = [
     "pwm.duty_offset",
 ];
 
+/// Causes that are the curve of a part, of which the plant has one law.
+pub const CURVES: [&str; 2] = ["l_saturation", "c_derating"];
+
 /// How a form is fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Search {
@@ -164,6 +167,12 @@ impl Candidate {
     pub fn is_of_edges(&self) -> bool {
         let mut keys = self.form.knobs.iter().flat_map(|knob| knob.keys);
         keys.all(|key| EDGES.contains(key)) && !self.form.knobs[0].keys.is_empty()
+    }
+
+    /// Whether it is the curve of a part, of which the plant has one law.
+    #[must_use]
+    pub fn is_curve(&self) -> bool {
+        CURVES.contains(&self.cause.id)
     }
 
     /// Whether it changes one of these numbers of the plant file.

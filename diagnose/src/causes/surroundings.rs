@@ -4,13 +4,16 @@ use super::knob::{Knob, Reach};
 use super::list::{GAIN, OHMS, cutting, form, knob, lag, resistor, searched};
 use super::{Cause, Cut, Kind, Search};
 
+// as far and in steps as large as other resistances
+const SOURCE_OHMS: Reach = Reach::SourceResistance(0.0, 0.5, 0.005);
+
 pub(super) const SOURCE_IMPEDANCE: Cause = Cause {
     id: "source_impedance",
     kind: Kind::Part,
     forms: &[
         form(
             "resistance of the source",
-            &[knob("resistance", &["source.resistance"], OHMS)],
+            &[knob("resistance", &["source.resistance"], SOURCE_OHMS)],
         ),
         searched(
             "resistance of the source before an input capacitor",
@@ -19,7 +22,7 @@ pub(super) const SOURCE_IMPEDANCE: Cause = Cause {
                 knob(
                     "resistance",
                     &["source.resistance"],
-                    Reach::ResistanceFrom(0.002, 0.5, 0.005),
+                    Reach::SourceResistance(0.002, 0.5, 0.005),
                 ),
                 knob("c_in", &["source.c_in"], Reach::Capacitance(10.0, 1e6, 20.0)),
             ],
@@ -32,7 +35,7 @@ pub(super) const SOURCE_IMPEDANCE: Cause = Cause {
                 knob(
                     "resistance",
                     &["source.resistance"],
-                    Reach::ResistanceFrom(0.01, 0.5, 0.005),
+                    Reach::SourceResistance(0.01, 0.5, 0.005),
                 ),
                 knob("c_in", &["source.c_in"], Reach::Capacitance(1.0, 1e4, 2.0)),
                 knob("esr_in", &["source.esr_in"], OHMS),
@@ -43,7 +46,7 @@ pub(super) const SOURCE_IMPEDANCE: Cause = Cause {
         searched(
             "resistance and inductance of the source before an input capacitor",
             &[
-                knob("resistance", &["source.resistance"], OHMS),
+                knob("resistance", &["source.resistance"], SOURCE_OHMS),
                 // a filter that swings within a few periods to some hundreds; the lower ends keep the integrator's steps long enough
                 knob(
                     "inductance",

@@ -1,6 +1,7 @@
 //! Single wild rows: a wrong bit, a lost byte, a cable that was touched.
 
 use super::channel;
+use crate::median::median;
 use crate::problem::Problem;
 use crate::record::{CHANNEL_NAMES, CHANNELS};
 
@@ -26,10 +27,12 @@ pub fn outliers(problem: &Problem, residual: &[f64]) -> Vec<Outlier> {
         for n in 0..CHANNELS {
             let left = channel(problem, residual, index, n);
             let raw: Vec<f64> = record.measured[n].iter().map(|v| v / problem.sigma[n]).collect();
+            let (wild, wild_raw) = (wild(&left), wild(&raw));
             for row in 2..record.rows().saturating_sub(2) {
                 // both: what leaps in the signal alone the model explains, what leaps in the residual alone it brings
                 let alone = leaps(&left, row) && (leaps(&raw, row) || leaps_off_curve(&raw, row));
-                if alone || leaps_in_a_pair(&left, row) && leaps_in_a_pair(&raw, row) {
+                let near_others = leaps_over(&left, &wild, row) && leaps_over(&raw, &wild_raw, row);
+                if alone || near_others || leaps_in_a_pair(&left, row) && leaps_in_a_pair(&raw, row) {
                     found.push(Outlier {
                         record: index,
                         row,
@@ -74,6 +77,44 @@ fn leaps_in_a_pair(values: &[f64], row: usize) -> bool {
         })
     };
     pair(-1) || pair(1)
+}
+
+/// Rows to either side whose median a wild row is far from: three wild rows of seven do not move it.
+const BESIDE: usize = 3;
+
+/// Rows that lie as far from what is around them as one of a pair has to.
+fn wild(values: &[f64]) -> Vec<bool> {
+    let around = |row: usize| {
+        let near = row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(values.len());
+        median(values[near].iter().copied().filter(|v| v.is_finite()))
+    };
+    let is_far = |row: usize| (values[row] - around(row)).abs() > OF_A_PAIR * FAR;
+    (0..values.len()).map(is_far).collect()
+}
+
+/// Whether a single wild row lies apart from the nearest two rows before and behind it that are not wild: other wild rows near it hide it. One
+/// with a wild row beside it is of an event or a pair.
+fn leaps_over(values: &[f64], wild: &[bool], row: usize) -> bool {
+    let nearest = |rows: &mut dyn Iterator<Item = usize>| -> Vec<f64> {
+        rows.take(BESIDE + 1)
+            .filter(|other| !wild[*other])
+            .take(2)
+            .map(|other| values[other])
+            .collect()
+    };
+    let near = [nearest(&mut (0..row).rev()), nearest(&mut (row + 1..values.len()))].concat();
+    let is_single = [row.checked_sub(1), Some(row + 1)]
+        .iter()
+        .flatten()
+        .all(|other| !wild.get(*other).copied().unwrap_or(false));
+    let ends = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = near.iter().fold(ends, |(low, high), v| (low.min(*v), high.max(*v)));
+    let apart = (values[row] - high).max(low - values[row]);
+    wild[row]
+        && is_single
+        && near.len() == 4
+        && near.iter().all(|v| v.is_finite())
+        && apart > OF_A_PAIR * FAR + (high - low)
 }
 
 /// A row lies off the curve through its neighbours this many times as far as rows near it do: a signal that swings bends everywhere.
@@ -127,7 +168,7 @@ pub fn spikes(problem: &Problem, outliers: &[Outlier]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::super::tests::normal;
-    use super::{leaps_in_a_pair, leaps_off_curve};
+    use super::{leaps_in_a_pair, leaps_off_curve, leaps_over, wild};
 
     #[test]
     fn a_spike_on_a_swing_is_seen_and_a_step_or_a_swing_is_none() {
@@ -147,6 +188,38 @@ mod tests {
         };
         assert_eq!(seen(&spiked), [93]);
         assert!(seen(&swing).is_empty() && seen(&step).is_empty());
+    }
+
+    #[test]
+    fn spikes_two_and_three_rows_apart_are_seen_and_what_lasts_longer_is_none() {
+        let mut state = 11;
+        let quiet: Vec<f64> = (0..200)
+            .map(|n| 20.0 * (f64::from(n) * 0.2).sin() + normal(&mut state))
+            .collect();
+        let mut spiked = quiet.clone();
+        for (row, by) in [(60, 150.0), (62, -140.0), (65, -150.0), (120, 145.0), (123, 150.0)] {
+            spiked[row] += by;
+        }
+        let mut moved = quiet.clone();
+        for (n, value) in moved.iter_mut().enumerate().skip(50) {
+            *value += if n < 130 { 300.0 } else { 0.0 };
+            // three rows of something, and a kick that dies
+            *value += if (90..93).contains(&n) { 200.0 } else { 0.0 };
+            *value += if n > 160 {
+                200.0 * (-(n as f64 - 161.0) / 4.0).exp()
+            } else {
+                0.0
+            };
+        }
+        let seen = |values: &[f64]| {
+            let wild = wild(values);
+            (2..198)
+                .filter(|row| leaps_over(values, &wild, *row))
+                .collect::<Vec<usize>>()
+        };
+        assert_eq!(seen(&spiked), [60, 62, 65, 120, 123]);
+        assert_eq!(seen(&quiet), [] as [usize; 0]);
+        assert_eq!(seen(&moved), [] as [usize; 0]);
     }
 
     #[test]

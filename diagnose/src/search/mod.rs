@@ -1,5 +1,6 @@
 //! The search for a set of causes: forward with several leaders, exchange, backward, and what would do as well.
 
+mod edges;
 mod forms;
 mod singles;
 pub(crate) mod sought;
@@ -124,7 +125,10 @@ impl Searcher<'_> {
         let causes = [set.causes, &[cause]].concat();
         // what looks best at first order is not always where the fit ends best
         let begins = self.begins(set, cause, from).into_iter().take(BEGUN);
-        let fits = begins.map(|(_, start)| self.fitter.from(&causes, &[set.values, &start].concat(), from));
+        let from_own = begins.map(|(_, start)| self.fitter.from(&causes, &[set.values, &start].concat(), from));
+        let edges = self.in_place_of_edges(cause, from).into_iter();
+        let instead = edges.map(|(start, from)| self.fitter.from(&causes, &[set.values, &start].concat(), &from));
+        let fits = from_own.chain(instead);
         let best = fits.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
         best.unwrap_or_else(|| self.fitter.unmoved(cause, 0.0))
     }

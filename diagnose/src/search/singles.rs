@@ -1,6 +1,6 @@
 //! Every candidate alone: a look at first order, the first steps of a fit, and the end of those that lead or come near.
 
-use super::{BEGUN, FOLLOWED, LEAST_FOLLOWED, NEAR, Searcher, Set, TIE_SHARE, gained};
+use super::{BEGUN, FOLLOWED, LEAST_FOLLOWED, NEAR, Searcher, Set, TIE_SHARE, gained, sought};
 use crate::causes::Search;
 use crate::fit::Fit;
 use crate::parallel;
@@ -26,7 +26,9 @@ impl Searcher<'_> {
         });
         let most = first_order.iter().copied().fold(0.0, f64::max);
         // a filter or a fall that is read off the records is far from its end, and promises little there
+        let asks_for_edges = self.asks_for_edges(null);
         let is_followed = |cause: usize| match self.search(cause) {
+            _ if asks_for_edges && self.fitter.candidates[cause].is_of_edges() => true,
             Search::Knee | Search::Swing => first_order[cause] != 0.0,
             _ => !self.begins_at_own(cause) || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED),
         };
@@ -35,7 +37,7 @@ impl Searcher<'_> {
             false => self.fitter.unmoved(*cause, first_order[*cause]),
         });
         let near = self.near_the_best(&looked);
-        progress::map(self.say, &format!("{stage}, those that come near"), &all, |cause| {
+        let mut fits = progress::map(self.say, &format!("{stage}, those that come near"), &all, |cause| {
             let fit = &looked[*cause];
             if !is_followed(*cause) || !near.contains(cause) {
                 return fit.clone();
@@ -46,14 +48,49 @@ impl Searcher<'_> {
             } else {
                 fit.clone()
             }
-        })
+        });
+        for cause in all.into_iter().filter(|cause| self.search(*cause) == Search::Swing) {
+            if let Some(better) = self.behind_resistance(cause, &fits) {
+                fits[cause] = better;
+            }
+        }
+        fits
+    }
+
+    /// An input filter from the resistance that fits without one, and from what swings beside it, where that is better: what the resistance
+    /// alone does may hide the swing. Where it does little, or all there is to do, there is no filter to be sought.
+    fn behind_resistance(&self, cause: usize, fits: &[Fit]) -> Option<Fit> {
+        let is_simple = |fit: &&Fit| self.same(fit.causes[0], cause) && fit.values.len() == 1 && fit.values[0] > 0.0;
+        let simple = fits.iter().find(is_simple)?;
+        let (null, left) = (self.fitter.null.chi2, simple.state.chi2);
+        if null - left < FOLLOWED * null || left < STILL_FAR * self.fitter.problem.count() as f64 {
+            return None;
+        }
+        let bases = &self.fitter.problem.bases;
+        let mut starts = sought::swings(self.fitter.problem, &simple.state.residual, bases);
+        if starts.is_empty() {
+            starts = sought::damped(bases);
+        }
+        for start in &mut starts {
+            start[0] = simple.values[0];
+        }
+        let begins = self
+            .ranked(&Set::NONE, cause, &simple.state, starts)
+            .into_iter()
+            .take(BEGUN);
+        let steps = begins.map(|(_, start)| self.fitter.first_steps(&[cause], &start, &simple.state));
+        let best = steps.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2))?;
+        let fit = self.fitter.from(&best.causes, &best.values, &best.state);
+        (fit.state.chi2 < fits[cause].state.chi2).then_some(fit)
     }
 
     /// A candidate alone after the first steps of its fit, which show whether it can come near.
     fn looked_at(&self, cause: usize) -> Fit {
         let null = self.fitter.null;
         let begins = self.begins(&Set::NONE, cause, null).into_iter().take(BEGUN);
-        let fits = begins.map(|(_, start)| self.fitter.first_steps(&[cause], &start, null));
+        let from_own = begins.map(|(_, start)| self.fitter.first_steps(&[cause], &start, null));
+        let edges = self.in_place_of_edges(cause, null).into_iter();
+        let fits = from_own.chain(edges.map(|(start, from)| self.fitter.first_steps(&[cause], &start, &from)));
         let best = fits.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
         best.unwrap_or_else(|| self.fitter.unmoved(cause, 0.0))
     }

@@ -63,17 +63,28 @@ pub(crate) fn swings(problem: &Problem, residual: &[f64], bases: &Bases) -> Vec<
     };
     // the output filter lets little of it through to the voltage, and the inductor's current shows it best
     let channels = if is_measured(3) { &[3][..] } else { &[1, 0] };
-    let power = bases.v * bases.i;
-    let seen = bases.v_in * bases.v_in / power;
-    let of = |frequency: f64| {
-        let rate = TAU * frequency;
-        IMPEDANCES.map(|share| {
-            let z = share * seen;
-            vec![0.5 * DAMPED * z, z / rate, 1.0 / (z * rate), 0.5 * DAMPED * z]
-        })
-    };
     let found = channels
         .iter()
         .flat_map(|channel| spectrum::swings(problem, residual, *channel));
-    found.flat_map(of).collect()
+    found.flat_map(|frequency| filters(frequency, bases)).collect()
+}
+
+/// Frequencies, as shares of the switching frequency, at which an input filter may swing whose swing stands out of nothing: twice as high
+/// each, since a damped swing is as wide as that.
+const SHARES: [f64; 6] = [0.01, 0.02, 0.04, 0.08, 0.16, 0.32];
+
+/// The same of filters that swing at any frequency: a resistance of the source damps one until no line stands out.
+pub(crate) fn damped(bases: &Bases) -> Vec<Vec<f64>> {
+    let frequencies = SHARES.into_iter().map(|share| share / bases.t_sw);
+    frequencies.flat_map(|frequency| filters(frequency, bases)).collect()
+}
+
+/// Input filters that swing at a frequency.
+fn filters(frequency: f64, bases: &Bases) -> [Vec<f64>; 2] {
+    let seen = bases.v_in * bases.v_in / (bases.v * bases.i);
+    let rate = TAU * frequency;
+    IMPEDANCES.map(|share| {
+        let z = share * seen;
+        vec![0.5 * DAMPED * z, z / rate, 1.0 / (z * rate), 0.5 * DAMPED * z]
+    })
 }

@@ -52,25 +52,33 @@ impl Searcher<'_> {
             let own = self.fitter.candidates[cause].own.clone();
             return vec![(from.chi2 - gained(&columns, &from.residual), own)];
         }
-        let looks = self
-            .starts(cause, from, set.columns)
-            .into_iter()
-            .enumerate()
-            .map(|(place, start)| {
-                let state = self.fitter.state_at(&[cause], &start, from, 0).0;
-                // the initial states and the others may have to follow before it shows what it is worth
-                let mut left = state.residual.clone();
-                self.fitter.basis.project(&mut left);
-                let mut columns = set.columns.to_vec();
-                columns.extend(self.tangents(cause, place, &state).iter().cloned());
-                (dot(&left, &left) - gained(&columns, &left), start)
-            });
-        let mut looks: Vec<_> = looks.collect();
-        looks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let looks = self.ranked(set, cause, from, self.starts(cause, from, set.columns));
         match (looks.first(), self.search(cause)) {
             (Some((_, step)), Search::Counter(_)) => vec![self.refined(set, cause, from, step[0].recip())],
             _ => looks,
         }
+    }
+
+    /// These starts of `cause`, and the chi-square that `set` with it would have from each at first order, best first.
+    pub(super) fn ranked(
+        &self,
+        set: &Set<'_>,
+        cause: usize,
+        from: &State,
+        starts: Vec<Vec<f64>>,
+    ) -> Vec<(f64, Vec<f64>)> {
+        let looks = starts.into_iter().enumerate().map(|(place, start)| {
+            let state = self.fitter.state_at(&[cause], &start, from, 0).0;
+            // the initial states and the others may have to follow before it shows what it is worth
+            let mut left = state.residual.clone();
+            self.fitter.basis.project(&mut left);
+            let mut columns = set.columns.to_vec();
+            columns.extend(self.tangents(cause, place, &state).iter().cloned());
+            (dot(&left, &left) - gained(&columns, &left), start)
+        });
+        let mut looks: Vec<_> = looks.collect();
+        looks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        looks
     }
 
     /// Tangents of a candidate at the `place`th of its starts, near `state`. Those of starts that stand in the list of causes are taken beside

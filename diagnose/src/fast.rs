@@ -18,6 +18,7 @@ use crate::noise::{self, channel};
 use crate::problem::Problem;
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS};
 use crate::shape::Structure;
+use crate::sides;
 use crate::words::si;
 
 /// Lowest frequency, over the sampling rate: slower structure shows in means of ten rows (`shape`).
@@ -103,7 +104,10 @@ pub fn structures(problem: &Problem, null: &State, state: &State) -> Vec<Structu
             if record.lattice[n] > 1.5 * problem.sigma[n] {
                 continue;
             }
-            let peaks = peaks(&left, &before, LOWEST, above_ring);
+            let mut peaks = peaks(&left, &before, LOWEST, above_ring);
+            if let Some(leap) = sides::unsure_leap(problem, state, index, n) {
+                peaks.retain(|peak| peak.amplitude * problem.sigma[n] > OF_LEAP * leap);
+            }
             if peaks.is_empty() {
                 continue;
             }
@@ -159,6 +163,9 @@ fn words(peak: &Peak, rows: usize, rate: f64, sigma: f64, unit: &'static str) ->
         peak.ratio
     )
 }
+
+/// Largest line that two sides of an edge draw, in leaps from one to the other: that of a square wave has 2 / pi of it.
+const OF_LEAP: f64 = 0.64;
 
 /// The lines of a course from the frequency `lowest` on, those below `above_ring` only if they go on throughout; a simulator that is off by
 /// its accuracy leaves that share of a line that was there `before`.

@@ -14,6 +14,7 @@ use plant::{Carrier, Topology};
 
 use crate::drive::simulate;
 use crate::fit::State;
+use crate::ideal::{self, Ideal};
 use crate::median::median;
 use crate::problem::Problem;
 use crate::record::Record;
@@ -66,6 +67,26 @@ fn direction(record: &Record, state: &State) -> Option<f64> {
         Carrier::Trailing => Some(-1.0),
         Carrier::Leading => Some(1.0),
         Carrier::Centre => None,
+    }
+}
+
+/// By how much rows at the edge may differ in a channel, in its unit, where nobody knows their sides; nothing where the record is not sampled
+/// there. A leap below the noise is not told row by row, and yet draws lines: sides follow each other in a beat of the clocks.
+pub(crate) fn unsure_leap(problem: &Problem, state: &State, index: usize, n: usize) -> Option<f64> {
+    let record = &problem.records[index];
+    direction(record, state)?;
+    let ideal = Ideal::of(record, &state.model.plant);
+    let v = problem.bases.v;
+    let currents = (0..record.rows()).map(|row| {
+        let drawn = ideal::drawn(&record.load[row], v);
+        ideal.inductor(drawn, record.duty[row]) + ideal.half(record.duty[row])
+    });
+    let leap = state.model.plant.capacitor.esr * median(currents);
+    // what a resistor draws leaps as the voltage does
+    match n {
+        0 => Some(leap),
+        2 => Some(leap * median(record.load.iter().map(|load| load.conductance))),
+        _ => None,
     }
 }
 

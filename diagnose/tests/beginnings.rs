@@ -5,7 +5,7 @@
 
 mod bench;
 
-use bench::{Bench, Noise, Table, integrate, of};
+use bench::{Bench, Noise, Table, at, integrate, of};
 use diagnose::diagnosis::diagnose;
 use diagnose::findings::{Findings, Verdict};
 use plant::{Carrier, Parameters};
@@ -109,14 +109,9 @@ fn stretch(x: &mut [f64; 3], (source, power): (f64, f64), share: f64) {
 fn record(course: &[(usize, f64)], seed: u64) -> Table {
     let mut random = Noise(seed);
     let mut x = [6.0, 12.0, course[0].1 / 12.0];
-    let mut columns = ["t", "duty", "v_out", "i_l", "r_load", "p_load"].map(|name| (name.to_owned(), Vec::new()));
+    let mut table = Table::of(&["t", "duty", "v_out", "i_l", "r_load", "p_load"]);
     for row in -3000..ROWS as isize {
-        let power = course
-            .iter()
-            .rev()
-            .find(|(from, _)| *from as isize <= row.max(0))
-            .unwrap()
-            .1;
+        let power = at(course, row, |step| step.0).1;
         stretch(&mut x, (48.0, power), 0.25);
         stretch(&mut x, (0.0, power), PHASE - 0.25);
         if row >= 0 {
@@ -130,13 +125,11 @@ fn record(course: &[(usize, f64)], seed: u64) -> Table {
                 4.0,
                 power,
             ];
-            for (column, value) in columns.iter_mut().zip(values) {
-                column.1.push(value);
-            }
+            table.push(&values);
         }
         stretch(&mut x, (0.0, power), 1.0 - PHASE);
     }
-    Table(columns.to_vec())
+    table
 }
 
 #[test]

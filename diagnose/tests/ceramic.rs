@@ -5,7 +5,7 @@
 
 mod bench;
 
-use bench::{Noise, Table, integrate};
+use bench::{Noise, Table, at, integrate};
 use diagnose::diagnosis::{Diagnosis, diagnose};
 use diagnose::findings::Verdict;
 use plant::Parameters;
@@ -47,10 +47,9 @@ const HARD: Ceramic = Ceramic {
 /// From each row on: duty and current of an electronic load. A synchronous leg, on at the start of a period, sampled there.
 fn record(part: Ceramic, course: &[(usize, f64, f64)], seed: u64) -> Table {
     let (mut x, mut random) = ([course[0].2, 11.0], Noise(seed));
-    let mut columns = ["t", "duty", "v_out", "i_l", "i_out"].map(|name| (name.to_owned(), Vec::new()));
+    let mut table = Table::of(&["t", "duty", "v_out", "i_l", "i_out"]);
     for row in -2000..ROWS as isize {
-        let of_row = course.iter().rev().find(|(from, ..)| *from as isize <= row.max(0));
-        let (_, duty, load) = *of_row.unwrap();
+        let (_, duty, load) = *at(course, row, |step| step.0);
         if row >= 0 {
             let values = [
                 row as f64 * PERIOD,
@@ -59,9 +58,7 @@ fn record(part: Ceramic, course: &[(usize, f64, f64)], seed: u64) -> Table {
                 x[0] + 0.012 * random.normal(),
                 load + 0.008 * random.normal(),
             ];
-            for (column, value) in columns.iter_mut().zip(values) {
-                column.1.push(value);
-            }
+            table.push(&values);
         }
         for (source, share) in [(V_IN, duty), (0.0, 1.0 - duty)] {
             integrate(&mut x, share * PERIOD / 10.0, 10, |x| {
@@ -70,7 +67,7 @@ fn record(part: Ceramic, course: &[(usize, f64, f64)], seed: u64) -> Table {
             });
         }
     }
-    Table(columns.to_vec())
+    table
 }
 
 /// With the capacitance that the model has at no voltage, and its curve.

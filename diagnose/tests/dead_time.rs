@@ -4,7 +4,7 @@
 
 mod bench;
 
-use bench::{Noise, Table, integrate};
+use bench::{Noise, Table, at, integrate};
 use diagnose::diagnosis::diagnose;
 use diagnose::extend::extended_toml;
 use diagnose::findings::Verdict;
@@ -50,11 +50,10 @@ fn stretch(x: &mut [f64; 2], way: Way, time: f64, load: f64, steps: usize) {
 /// From each row on: duty and current of an electronic load.
 fn record(course: &[(usize, f64, f64)], seed: u64) -> Table {
     let (mut x, mut random) = ([course[0].2, 11.0], Noise(seed));
-    let mut columns = ["t", "duty", "v_out", "i_l", "i_out"].map(|name| (name.to_owned(), Vec::new()));
+    let mut table = Table::of(&["t", "duty", "v_out", "i_l", "i_out"]);
     let read = |value: f64, step: f64| (value / step).round() * step;
     for row in -2500..ROWS as isize {
-        let of_row = course.iter().rev().find(|(from, ..)| *from as isize <= row.max(0));
-        let (_, duty, load) = *of_row.unwrap();
+        let (_, duty, load) = *at(course, row, |step| step.0);
         let on = duty * PERIOD;
         stretch(&mut x, Way::Diode, DEAD, load, 2);
         stretch(&mut x, Way::Upper, on - DEAD, load, 8);
@@ -69,13 +68,11 @@ fn record(course: &[(usize, f64, f64)], seed: u64) -> Table {
                 read(x[0] + 0.012 * random.normal(), 25.0 / 4096.0),
                 read(load + 0.008 * random.normal(), 25.0 / 4096.0),
             ];
-            for (column, value) in columns.iter_mut().zip(values) {
-                column.1.push(value);
-            }
+            table.push(&values);
         }
         stretch(&mut x, Way::Lower, (1.0 - PHASE) * PERIOD, load, 6);
     }
-    Table(columns.to_vec())
+    table
 }
 
 /// The edges of the gate take what of a dead time nobody tells from them, and a diode was fitted beside it and taken out again: the value is

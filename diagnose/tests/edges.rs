@@ -4,7 +4,7 @@
 
 mod bench;
 
-use bench::{Bench, Noise, Table};
+use bench::{Bench, Noise, Table, at};
 use diagnose::diagnosis::{Diagnosis, diagnose};
 use diagnose::findings::Verdict;
 use plant::Parameters;
@@ -70,13 +70,9 @@ fn record(
     seed: u64,
 ) -> Table {
     let (mut x, mut random) = ([course[0].2, 12.0], Noise(seed));
-    let mut columns = ["t", "duty", "v_out", "i_l", "i_load"].map(|name| (name.to_owned(), Vec::new()));
+    let mut table = Table::of(&["t", "duty", "v_out", "i_l", "i_load"]);
     for row in -4000..ROWS as isize {
-        let (_, duty, load) = *course
-            .iter()
-            .rev()
-            .find(|(from, ..)| *from as isize <= row.max(0))
-            .unwrap();
+        let (_, duty, load) = *at(course, row, |step| step.0);
         let mut shown = None;
         for (is_on, share, sampled) in pieces(duty) {
             leg.stretch(&mut x, is_on, share, load);
@@ -94,11 +90,9 @@ fn record(
             i + noise[1] * random.normal(),
             load,
         ];
-        for (column, value) in columns.iter_mut().zip(values) {
-            column.1.push(value);
-        }
+        table.push(&values);
     }
-    Table(columns.to_vec())
+    table
 }
 
 fn model(text: &str) -> Parameters {
@@ -338,4 +332,27 @@ fn rows_behind_the_edge_at_the_start_of_the_period_are_left_out() {
         "{:?}",
         found.noise.repairs
     );
+}
+
+#[test]
+fn sides_in_a_beat_below_the_noise_draw_no_line() {
+    let model = model(&format!(
+        "[converter]\ntopology = \"boost\"\nrectifier = \"synchronous\"\nv_in = 24.0\ninductance = 21e-6\ncapacitance = 220e-6\nf_sw = 100e3\n\
+         [inductor]\ndcr = {R}\n[capacitor]\nesr = {ESR}\n"
+    ));
+    // two clocks beat: three rows of sixteen are taken behind the edge, whose leap of 0.2 V is twice the noise
+    let row = std::cell::Cell::new(-4001_isize);
+    let pieces = |duty: f64| {
+        row.set(row.get() + 1);
+        let late = (3 * row.get()).rem_euclid(16) < 3;
+        vec![(late, 0.0, Some(late)), (true, duty, None), (false, 1.0 - duty, None)]
+    };
+    let course: &Course = &[(0, 0.5, 10.0), (200, 0.51, 10.0), (400, 0.49, 12.0)];
+    let record = record(BOOST, course, 0.0, &pieces, [0.09, 0.05], 71)
+        .read("run", &model)
+        .unwrap();
+    let found = diagnose(&model, vec![record], &[], &|_| ()).findings;
+    // a fifth of the leap remains as an offset of the voltage, which the records do have
+    assert_ne!(found.verdict, Verdict::Unexplained, "{}", found.sentence);
+    assert!(!found.sentence.contains("a line at"), "{}", found.sentence);
 }

@@ -4,7 +4,7 @@
 
 mod bench;
 
-use bench::{Noise, Table, integrate};
+use bench::{Noise, Table, at, integrate};
 use diagnose::diagnosis::{Diagnosis, diagnose_knowing};
 use diagnose::findings::Verdict;
 use plant::Parameters;
@@ -87,10 +87,9 @@ fn stretch(x: &mut X, leads: Leads, is_on: bool, share: f64, load: f64) {
 /// From each row on: duty and current of an electronic load.
 fn record(leads: Leads, course: &[(usize, f64, f64)], seed: u64) -> Table {
     let (mut x, mut random) = ([course[0].2, 5.0, V_IN, 1.0], Noise(seed));
-    let mut columns = ["t", "duty", "v_out", "i_l", "i_out"].map(|name| (name.to_owned(), Vec::new()));
+    let mut table = Table::of(&["t", "duty", "v_out", "i_l", "i_out"]);
     for row in -2500..ROWS as isize {
-        let of_row = course.iter().rev().find(|(from, ..)| *from as isize <= row.max(0));
-        let (_, duty, load) = *of_row.unwrap();
+        let (_, duty, load) = *at(course, row, |step| step.0);
         if row >= 0 {
             let values = [
                 row as f64 * PERIOD,
@@ -99,14 +98,12 @@ fn record(leads: Leads, course: &[(usize, f64, f64)], seed: u64) -> Table {
                 x[0] + 0.015 * random.normal(),
                 load + 0.015 * random.normal(),
             ];
-            for (column, value) in columns.iter_mut().zip(values) {
-                column.1.push(value);
-            }
+            table.push(&values);
         }
         stretch(&mut x, leads, true, duty, load);
         stretch(&mut x, leads, false, 1.0 - duty, load);
     }
-    Table(columns.to_vec())
+    table
 }
 
 fn found(leads: Leads, certain: &[&str], seed: u64) -> Diagnosis {

@@ -4,7 +4,7 @@
 
 mod bench;
 
-use bench::{Noise, Table, integrate};
+use bench::{Noise, Table, at, integrate};
 use diagnose::diagnosis::{Diagnosis, diagnose};
 use diagnose::findings::{Findings, Verdict};
 use plant::Parameters;
@@ -53,10 +53,9 @@ fn stretch(x: &mut [f64; 2], core: Core, is_on: bool, share: f64, load: f64) {
 /// From each row on: duty and current of an electronic load.
 fn record(core: Core, course: &[(usize, f64, f64)], seed: u64) -> Table {
     let (mut x, mut random) = ([course[0].2, 6.0], Noise(seed));
-    let mut columns = ["t", "duty", "v_out", "i_l", "i_load"].map(|name| (name.to_owned(), Vec::new()));
+    let mut table = Table::of(&["t", "duty", "v_out", "i_l", "i_load"]);
     for row in -2500..ROWS as isize {
-        let of_row = course.iter().rev().find(|(from, ..)| *from as isize <= row.max(0));
-        let (_, duty, load) = *of_row.unwrap();
+        let (_, duty, load) = *at(course, row, |step| step.0);
         stretch(&mut x, core, true, duty, load);
         stretch(&mut x, core, false, PHASE - duty, load);
         if row >= 0 {
@@ -67,13 +66,11 @@ fn record(core: Core, course: &[(usize, f64, f64)], seed: u64) -> Table {
                 x[0] + 0.02 * random.normal(),
                 load,
             ];
-            for (column, value) in columns.iter_mut().zip(values) {
-                column.1.push(value);
-            }
+            table.push(&values);
         }
         stretch(&mut x, core, false, 1.0 - PHASE, load);
     }
-    Table(columns.to_vec())
+    table
 }
 
 fn found(core: Core) -> Diagnosis {

@@ -26,18 +26,13 @@ fn table(duties: &[f64], currents: &[f64], order: &Order) -> Table {
     order(&mut points);
     let noise = &mut Noise(5);
     let [winding, lower, upper] = RESISTANCES;
-    let mut columns = ["duty", "v_out", "i_out", "v_in"].map(|name| (name.to_owned(), Vec::new()));
+    let mut table = Table::of(&["duty", "v_out", "i_out", "v_in"]);
     for (d, i) in points {
         // the current's ripple squares out over a period to first order
         let v = d * V_IN - i * (winding + d * upper + (1.0 - d) * lower);
-        for (column, value) in columns
-            .iter_mut()
-            .zip([d, v + 1e-3 * noise.normal(), i, V_IN + 2e-3 * noise.normal()])
-        {
-            column.1.push(value);
-        }
+        table.push(&[d, v + 1e-3 * noise.normal(), i, V_IN + 2e-3 * noise.normal()]);
     }
-    Table(columns.to_vec())
+    table
 }
 
 fn model() -> Parameters {
@@ -80,18 +75,16 @@ fn a_counter_of_few_counts_is_found_in_settled_points() {
     // the points lie 20 to 50 mV beside the commanded duties, as those of no converter do; the resistances are the model's
     for (counts, up) in [(96.0, 0.5), (128.0, 0.0), (60.0, 0.5)] {
         let noise = &mut Noise(23);
-        let mut columns = ["duty", "v_out", "i_out", "v_in"].map(|name| (name.to_owned(), Vec::new()));
+        let mut table = Table::of(&["duty", "v_out", "i_out", "v_in"]);
         for n in 0..26 {
             let command = 0.2 + 0.0091 * f64::from(n);
             let i = 2.0 + f64::from(n * 7 % 11) + 5e-3 * noise.normal();
             let d = (command * counts + up).floor() / counts;
             let v = d * V_IN - i * (7e-3 + d * 11e-3 + (1.0 - d) * 6e-3);
             let values = [command, v + 2e-3 * noise.normal(), i, V_IN + 2e-3 * noise.normal()];
-            for (column, value) in columns.iter_mut().zip(values) {
-                column.1.push(value);
-            }
+            table.push(&values);
         }
-        let record = Table(columns.to_vec()).read("sweep", &model()).unwrap();
+        let record = table.read("sweep", &model()).unwrap();
         let findings = diagnose(&model(), vec![record], &[], &|_| ()).findings;
         let ids: Vec<&str> = findings.causes.iter().map(|cause| cause.id).collect();
         assert_eq!(ids, ["duty_quantisation"], "{counts}: {}", findings.sentence);

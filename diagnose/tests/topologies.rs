@@ -88,7 +88,7 @@ impl Circuit {
             self.period(course[0].1, course[0].2, &mut state);
         }
         let names = ["t", "duty", "v_out", "i_l", "r_load"];
-        let mut columns = names.map(|name| (name.to_owned(), Vec::new()));
+        let mut table = Table::of(&names);
         for row in 0..rows {
             let (_, duty, load) = course.iter().rev().find(|(from, ..)| *from <= row).unwrap();
             let shown = [
@@ -98,12 +98,10 @@ impl Circuit {
                 state[0] + 0.02 * noise.normal(),
                 *load,
             ];
-            for (column, value) in columns.iter_mut().zip(shown) {
-                column.1.push(value);
-            }
+            table.push(&shown);
             self.period(*duty, *load, &mut state);
         }
-        Table(columns.to_vec())
+        table
     }
 }
 
@@ -111,7 +109,7 @@ impl Circuit {
     /// Mean voltages of settled points, of noise 20 mV.
     fn settled(&self, seed: u64) -> Table {
         let noise = &mut Noise(seed);
-        let mut columns = ["duty", "v_out", "r_load"].map(|name| (name.to_owned(), Vec::new()));
+        let mut table = Table::of(&["duty", "v_out", "r_load"]);
         for duty in [0.2, 0.3, 0.4, 0.5, 0.55] {
             for load in [6.0, 9.0, 14.0] {
                 let mut state = [0.0, V_IN, 0.0];
@@ -120,12 +118,10 @@ impl Circuit {
                     self.period(duty, load, &mut state);
                 }
                 let shown = [duty, state[2] * F_SW + 0.02 * noise.normal(), load];
-                for (column, value) in columns.iter_mut().zip(shown) {
-                    column.1.push(value);
-                }
+                table.push(&shown);
             }
         }
-        Table(columns.to_vec())
+        table
     }
 }
 

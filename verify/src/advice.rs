@@ -11,7 +11,7 @@ use targets::TargetSpec;
 
 use crate::budget::{Budget, Clock, Fit, Slot, percents};
 use crate::costs::StepCosts;
-use crate::fitting::{Bench, Candidate, Fitting, Widest, with_relu};
+use crate::fitting::{Bench, Candidate, Fitting, Widest};
 use crate::lateness;
 use crate::measure::Costs;
 use nearest::{InFormat, nearest};
@@ -141,13 +141,9 @@ fn too_slow(policy: &Policy, bench: Bench<'_>, all: &[&Proposal]) -> Vec<String>
         nearest.remarks(policy)
     )];
     let candidates: Vec<Candidate> = all.iter().map(|proposal| proposal.candidate.clone()).collect();
-    // who trains again may choose the activation, too
-    let relu = with_relu(policy);
-    let (whole, with) = match &relu {
-        Some(relu) => (bench.whole(relu, &candidates), " with relu"),
-        None => (None, ""),
-    };
-    lines.extend(whole.as_ref().map(|whole| {
+    let again = bench.retrained(policy, &candidates);
+    let with = again.with;
+    lines.extend(again.whole.as_ref().map(|whole| {
         format!(
             "  = hint: trained with relu the same network takes {} % in {} with {}",
             percents(whole.share),
@@ -155,10 +151,10 @@ fn too_slow(policy: &Policy, bench: Bench<'_>, all: &[&Proposal]) -> Vec<String>
             whole.build
         )
     }));
-    if whole.is_some_and(|whole| whole.fits()) {
+    if again.whole.as_ref().is_some_and(Fitting::fits) {
         return lines;
     }
-    match bench.widest(relu.as_ref().unwrap_or(policy), &candidates) {
+    match bench.widest(again.or(policy), &candidates) {
         Widest::Fits(Fitting {
             sizes,
             format,

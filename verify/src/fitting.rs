@@ -212,13 +212,23 @@ impl Bench<'_> {
     }
 
     /// The format and the build that take the policy fastest, as wide as it is; `None` where it cannot be counted.
-    #[must_use]
-    pub fn whole(&self, policy: &Policy, candidates: &[Candidate]) -> Option<Fitting> {
+    fn whole(&self, policy: &Policy, candidates: &[Candidate]) -> Option<Fitting> {
         let found = self.sensible(candidates).into_iter().filter_map(|candidate| {
             let policy = policy.clone().with_format(candidate.format);
             self.fastest(&policy, candidate)
         });
         found.fold(None, Fitting::nearer)
+    }
+
+    /// The policy with ReLU, and what it would take as wide as it is.
+    #[must_use]
+    pub fn retrained(&self, policy: &Policy, candidates: &[Candidate]) -> Retrained {
+        let relu = with_relu(policy);
+        Retrained {
+            whole: relu.as_ref().and_then(|relu| self.whole(relu, candidates)),
+            with: if relu.is_some() { " with relu" } else { "" },
+            relu,
+        }
     }
 
     /// What a step takes, as [`Fitting::share`]; `None` where it cannot be built or does not run here.
@@ -242,9 +252,27 @@ impl Bench<'_> {
     }
 }
 
+/// What a policy becomes for one who trains it again, and may choose the activation then.
+#[derive(Debug)]
+pub struct Retrained {
+    /// With ReLU, where the activation is a formula.
+    relu: Option<Policy>,
+    /// What that takes; `None` where it cannot be counted.
+    pub whole: Option<Fitting>,
+    /// Said of it.
+    pub with: &'static str,
+}
+
+impl Retrained {
+    /// The network that is cut down, `policy` as it is if its activation is no formula.
+    #[must_use]
+    pub fn or<'a>(&'a self, policy: &'a Policy) -> &'a Policy {
+        self.relu.as_ref().unwrap_or(policy)
+    }
+}
+
 /// The policy with ReLU in the place of an activation that is a formula; `None` where there is none such.
-#[must_use]
-pub fn with_relu(policy: &Policy) -> Option<Policy> {
+fn with_relu(policy: &Policy) -> Option<Policy> {
     let is_formula = |layer: &policy::model::Layer| layer.activation.curve().is_some();
     let has_formula = policy.layers.iter().any(is_formula);
     has_formula.then(|| policy.activated_by(policy::Activation::Relu))?

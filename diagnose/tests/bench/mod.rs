@@ -27,6 +27,12 @@ pub fn integrate<const N: usize>(x: &mut [f64; N], h: f64, steps: usize, slope: 
     }
 }
 
+/// The step of a course that a row is in, by the row from which each holds; the first before the record begins.
+pub fn at<T>(course: &[T], row: isize, from: impl Fn(&T) -> usize) -> &T {
+    let last = course.iter().rev().find(|step| from(step) as isize <= row.max(0));
+    last.unwrap_or_else(|| panic!("no step of the course at row {row}"))
+}
+
 /// Longest step of the integration, periods.
 const STEP: f64 = 1.0 / 24.0;
 
@@ -152,6 +158,19 @@ impl Noise {
 pub struct Table(pub Vec<(String, Vec<f64>)>);
 
 impl Table {
+    /// Without rows as yet.
+    pub fn of(names: &[&str]) -> Self {
+        Table(names.iter().map(|name| ((*name).to_owned(), Vec::new())).collect())
+    }
+
+    /// Takes in a row, a value for each column.
+    pub fn push(&mut self, row: &[f64]) {
+        assert_eq!(row.len(), self.0.len());
+        for (column, value) in self.0.iter_mut().zip(row) {
+            column.1.push(*value);
+        }
+    }
+
     pub fn column(&mut self, name: &str) -> &mut Vec<f64> {
         let found = self.0.iter().position(|(known, _)| known == name);
         &mut self.0[found.unwrap_or_else(|| panic!("no column {name}"))].1

@@ -17,7 +17,7 @@ use super::nearest::{InFormat, nearest};
 use super::{arrows, in_format, or_faster, others, trained_for_the_whole, tried, what_it_changes};
 use crate::budget::{Clock, Slot};
 use crate::costs::StepCosts;
-use crate::fitting::{Bench, Candidate, Fitting, Widest, with_relu};
+use crate::fitting::{Bench, Candidate, Fitting, Widest};
 use crate::measure::Costs;
 
 /// A branch may be folded into the instructions beside it, so that a cycle ends more than begin in it: in the loops of a network less
@@ -239,12 +239,9 @@ impl Case<'_> {
             clock: self.clock,
         };
         let candidates: Vec<Candidate> = all().map(|need| need.candidate.clone()).collect();
-        let relu = with_relu(self.policy);
-        let (whole, with) = match &relu {
-            Some(relu) => (bench.whole(relu, &candidates), " with relu"),
-            None => (None, ""),
-        };
-        lines.extend(whole.as_ref().map(|whole| {
+        let again = bench.retrained(self.policy, &candidates);
+        let with = again.with;
+        lines.extend(again.whole.as_ref().map(|whole| {
             format!(
                 "  = hint: trained with relu the same network needs {:.2} in {} with {}",
                 whole.share.1,
@@ -252,10 +249,10 @@ impl Case<'_> {
                 whole.build
             )
         }));
-        if whole.is_some_and(|whole| whole.fits()) {
+        if again.whole.as_ref().is_some_and(Fitting::fits) {
             return lines;
         }
-        match bench.widest(relu.as_ref().unwrap_or(self.policy), &candidates) {
+        match bench.widest(again.or(self.policy), &candidates) {
             Widest::Fits(Fitting {
                 sizes,
                 format,

@@ -80,6 +80,8 @@ const NUDGE: f64 = 1e-4;
 const OF_COUNTER: f64 = 1.0 / 3.0;
 /// Fewest points beyond the terms.
 const MORE_FOR_COUNTER: usize = 12;
+/// Most points that are asked: of thousands each count would cost as much as a simulation.
+const ASKED: usize = 64;
 
 /// Whether the points are those of a converter whose counter knows few duties: the commanded ones are not what the switch did.
 fn is_of_counter(ideal: &Ideal, points: &[Point], rms: f64) -> bool {
@@ -88,6 +90,11 @@ fn is_of_counter(ideal: &Ideal, points: &[Point], rms: f64) -> bool {
     // a duty that is rounded is off by its step over the root of twelve
     let counts = slope.abs() / (rms * libm::sqrt(12.0));
     let [low, high] = AROUND.map(|share| share * counts);
+    let points: Vec<Point> = points
+        .iter()
+        .copied()
+        .step_by(points.len().div_ceil(ASKED).max(1))
+        .collect();
     let tried = (0..=((high - low) / APART) as usize).map(|n| low + n as f64 * APART);
     let left_by = |counts: f64, cut: f64| {
         let rounded = |p: &Point| (p.0, libm::floor(p.1 * counts + cut) / counts, p.2);

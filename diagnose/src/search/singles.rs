@@ -12,6 +12,9 @@ const BROUGHT_TO_AN_END: usize = 10;
 /// Mean square over that of the noise from which on the best single cause leaves structure for sure, in `shape` from 2.5 on.
 const STILL_FAR: f64 = 4.0;
 
+/// Share of the resistance that fits alone which an input filter behind it has: the swing moves it by less. A convention.
+const KEPT: f64 = 0.5;
+
 impl Searcher<'_> {
     /// Every candidate alone. Those that explain next to nothing at first order are not followed further.
     pub fn singles(&self, stage: &str) -> Vec<Fit> {
@@ -81,7 +84,9 @@ impl Searcher<'_> {
         let steps = begins.map(|(_, start)| self.fitter.first_steps(&[cause], &start, &simple.state));
         let best = steps.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2))?;
         let fit = self.fitter.from(&best.causes, &best.values, &best.state);
-        (fit.state.chi2 < fits[cause].state.chi2).then_some(fit)
+        // it is that resistance that damps: a filter without it, whose capacitor has one, is another's form of what a switch has
+        let is_behind = fit.values[0] > KEPT * simple.values[0];
+        (is_behind && fit.state.chi2 < fits[cause].state.chi2).then_some(fit)
     }
 
     /// A candidate alone after the first steps of its fit, which show whether it can come near.

@@ -246,7 +246,7 @@ fn unseen(truth: &Truth) -> bool {
 
 /// A tied cause is named alone and without the hidden one among its rivals.
 fn untold(truth: &Truth, causes: &[Named]) -> bool {
-    let hidden = |id: &String| truth.hidden.iter().any(|hidden| hidden.id == *id);
+    let hidden = |id: &String| truth.hidden.iter().any(|hidden| hidden.id == *id) || same_instant(truth, id);
     let told = |cause: &Named| hidden(&cause.id) || cause.rivals.iter().flatten().any(hidden);
     truth.family == Family::Cause && !causes.iter().any(told)
 }

@@ -28,7 +28,7 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>, left:
         Verdict::Unexplained if found.is_misread() => {
             let faults = doubts::said(&found.doubts).join("; ");
             format!(
-                "The records are not read as they were made: {faults}. Read so, the model explains them within their noise; no cause was sought."
+                "The records are not read as they were made: {faults}. Read so, the model explains them within their noise, and no cause is named."
             )
         }
         Verdict::Unexplained => {

@@ -22,7 +22,7 @@ use crate::level::threshold;
 use crate::noise;
 use crate::problem::{Problem, dot};
 use crate::progress::{Listener, Progress};
-use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
+use crate::record::{CHANNEL_NAMES, CHANNELS, LOAD_CURRENT, Record};
 use crate::shape::{self, Structure, structures};
 use crate::worth;
 
@@ -41,8 +41,6 @@ const FEWEST_RECORDS: usize = 2;
 /// The causes may make what was set aside this much worse, in squares, since what disturbs it may run against them: an effect and a
 /// disturbance of one size that follow each other to .6 do so by 1.25. A convention above it.
 const WORSE: f64 = 1.5;
-/// The channel of the load current.
-const LOAD_CURRENT: usize = 2;
 
 /// A part of the records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

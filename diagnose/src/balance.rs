@@ -25,10 +25,11 @@ const MORE: usize = 3;
 /// A settled point: voltage, duty, drawn current.
 type Point = (f64, f64, f64);
 
-/// What is wrong, if no such converter gives the settled points of a record.
+/// What is wrong, if no such converter gives the settled points of a record, or where the records rest ([`crate::rising`]).
 #[must_use]
 pub fn broken(problem: &Problem) -> Option<String> {
-    problem.records.iter().find_map(|record| of(problem, record))
+    let points = problem.records.iter().find_map(|record| of(problem, record));
+    points.or_else(|| crate::rising::broken(problem))
 }
 
 fn of(problem: &Problem, record: &Record) -> Option<String> {
@@ -144,7 +145,7 @@ pub(crate) fn scatter(problem: &Problem, record: &Record, values: &[f64]) -> Opt
 }
 
 /// The sum of squares that the columns leave of some values.
-fn left(columns: &[Vec<f64>], values: &[f64]) -> f64 {
+pub(crate) fn left(columns: &[Vec<f64>], values: &[f64]) -> f64 {
     let matrix: Vec<Vec<f64>> = columns
         .iter()
         .map(|a| columns.iter().map(|b| dot(a, b)).collect())

@@ -6,13 +6,11 @@ use crate::causes::{Candidate, Search};
 use crate::findings::Named;
 use crate::problem::Problem;
 use crate::profile::Profile;
-use crate::record::{CHANNEL_NAMES, CHANNELS};
+use crate::record::{CHANNEL_NAMES, CHANNELS, V_IN};
 use crate::shape::Structure;
 use crate::small;
 use crate::words::{si, unit};
 
-/// The channel of the source voltage, which stands still.
-const V_IN: usize = 3;
 /// A value so near to its bound, as a share of its range, is at it: a fit stops there because it may not go on.
 const AT_BOUND: f64 = 0.01;
 /// A lower bound of a size below this share of the upper one is where an effect ends to be one, not where it is cut off.

@@ -10,7 +10,7 @@ use crate::instants;
 use crate::level::ACCURACY;
 use crate::noise;
 use crate::problem::{Problem, dot};
-use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Record};
+use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, LOAD_CURRENT, Record};
 use crate::sampling;
 use crate::sides;
 use crate::unsure_levels;
@@ -126,8 +126,6 @@ const MUCH_WORSE: f64 = 2.5;
 /// Correlation of neighbours from which on an error is more than noise: a coarser range of the scope or a wild sample leaves none,
 /// and an error that makes a mean square of 2.5 out of one of 1 leaves 1.5 / 2.5 where it is smooth. Half of that.
 const RELATED: f64 = 0.3;
-/// The channel of the load current.
-const LOAD_CURRENT: usize = 2;
 
 /// A held-out record with both simulations, for pictures.
 #[derive(Debug, Clone)]

@@ -61,6 +61,7 @@ pub mod record;
 pub mod resistors;
 pub mod results;
 pub mod retrain;
+mod rising;
 pub mod rivals;
 mod sampling;
 mod search;

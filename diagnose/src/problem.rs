@@ -13,7 +13,7 @@ use crate::drive::{Begin, Model, Start, simulate};
 use crate::flicker;
 use crate::ideal::{self, Ideal};
 use crate::noise::Outlier;
-use crate::record::{CHANNELS, Record};
+use crate::record::{CHANNELS, LOAD_CURRENT, Record};
 use crate::work::Work;
 use setup::{bases, cut_unstable, share_source_voltage};
 
@@ -23,9 +23,8 @@ pub const LOST: f64 = 1e6;
 /// What stands in a residual where a value that counts is met to its last digit, over the noise: 0 says that nothing counts.
 const NO_ERROR: f64 = 1e-12;
 
-/// The channels in which a load step leaps.
+/// The channel in which a load step leaps beside its current.
 const OUTPUT_VOLTAGE: usize = 0;
-const LOAD_CURRENT: usize = 2;
 
 /// The problem.
 #[derive(Debug, Clone)]

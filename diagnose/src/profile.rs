@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use crate::attribute::Attribution;
-use crate::causes::Search;
+use crate::causes::{Candidate, Search};
 use crate::exact::Exact;
 use crate::fit::Fit;
 use crate::level::ACCURACY;
@@ -113,15 +113,9 @@ fn of_best(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> (
             own: candidate.own[place.1],
             curve: vec![(value, 0.0)],
         };
-        let sigma = (best.covariance[*number][*number] * attribution.inflation).sqrt();
         let [low, high, step] = fitter.range(place);
-        // where the fit held it at an end, or had no slope, its own step is the scale at which other values are tried
-        let sigma = match sigma > 0.0 {
-            // a tangent next to that of the trim: what the two differ by is their curvature, and tells the covariance too much
-            true if candidate.is_of_edges() => sigma.max(step),
-            true => sigma,
-            false => step,
-        };
+        let sigma = (best.covariance[*number][*number] * attribution.inflation).sqrt();
+        let sigma = scale(candidate, sigma, step);
         let lower: RefCell<Option<Fit>> = RefCell::new(None);
         let at_value = |x: f64| {
             let mut values = best.values.clone();
@@ -148,19 +142,17 @@ fn of_best(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> (
             profile.curve.push((x, at_value(x)));
         }
         for (side, sign) in [(0, -1.0), (1, 1.0)] {
-            // without the cause, chi-square is what its evidence says: the interval ends before that
             let none = profile.own - value;
+            // without the cause, chi-square is what its evidence says: the interval ends before that
             let is_size = place.1 < candidate.sizes() && candidate.sizes() == 1 && none.signum() == sign;
             let lost = attribution.evidence.get(profile.member).filter(|_| is_size);
-            let outer = lost
-                .map(|lost| (profile.own, lost / attribution.inflation))
-                .filter(|end| end.1 > LEVEL);
+            let lost = lost.map(|lost| (profile.own, lost / attribution.inflation));
             let mut side_of = Side {
                 value,
                 sign,
                 range: [low, high],
                 inner: (value, 0.0),
-                outer,
+                outer: lost.filter(|end| end.1 > LEVEL),
             };
             let end = side_of.end(&mut profile.curve, &at_value);
             // a simulator that is off by a share of a response puts the parameter off by that share of its change
@@ -178,6 +170,17 @@ fn of_best(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> (
         .flatten()
         .min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
     (profiles, lowest)
+}
+
+/// At which other values are tried, as a standard deviation of the parameter: `sigma` is what the covariance says, `step` the knob's own.
+fn scale(candidate: &Candidate, sigma: f64, step: f64) -> f64 {
+    match sigma > 0.0 {
+        // a tangent next to that of the trim: what the two differ by is their curvature, and tells the covariance too much
+        true if candidate.is_of_edges() => sigma.max(step),
+        true => sigma,
+        // the fit held it at an end, or it had no slope
+        false => step,
+    }
 }
 
 /// What covariances say of the parameters: intervals without a fit.

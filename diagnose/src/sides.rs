@@ -18,9 +18,8 @@ use crate::ideal::{self, Ideal};
 use crate::median::median;
 use crate::problem::Problem;
 use crate::record::Record;
+use crate::record::edges::NEAR;
 
-/// How near to the start of the period a sample is at its edge, as a share of it; as of the other edges.
-const NEAR: f64 = 2e-3;
 /// Most that one bend of what the model leaves counts, in leaps: a step of the load that the model has elsewhere bends as well, and farther.
 const MOST: f64 = 1.5;
 /// What a row behind the edge costs, in leaps: where all rows are behind it nothing bends, and then the model's side is as good as the other.

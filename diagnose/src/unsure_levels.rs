@@ -9,12 +9,10 @@ use crate::drive::Model;
 use crate::fit::State;
 use crate::parallel;
 use crate::problem::{Problem, dot};
-use crate::record::CHANNELS;
+use crate::record::{CHANNELS, LOAD_CURRENT};
 
 /// A level is free where a standard deviation of it moves chi-square by as much as one number more does by chance.
 const SHOWS: f64 = 1.0;
-/// The channel of the load current itself shows a level whatever the converter does.
-const LOAD_CURRENT: usize = 2;
 
 /// Frees the levels whose uncertainty shows in the records; whether there are any. `null` then has to be settled again.
 pub(crate) fn free(problem: &mut Problem, model: &Model, null: &mut State) -> bool {

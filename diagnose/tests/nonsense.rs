@@ -241,6 +241,101 @@ fn rows_in_disorder_are_not_searched() {
     assert!(found.attribution.singles.iter().all(|single| single.state.chi2 == null));
 }
 
+/// A record of steps of the duty, at a resistor or at a current.
+fn stepped(bench: &Bench) -> Bench {
+    let levels = [0.4, 0.62, 0.3, 0.55, 0.47, 0.35];
+    Bench {
+        rows: 480,
+        duty: levels.iter().enumerate().map(|(n, d)| (80 * n, *d)).collect(),
+        ..bench.clone()
+    }
+}
+
+/// No cause makes a voltage that the duty does not raise: nothing is sought, whatever the load does.
+#[test]
+fn a_voltage_that_does_not_rise_with_the_duty_is_not_searched() {
+    let mut random = Noise(71);
+    let loads = [
+        vec![(0.0, 0.0, 5.0)],
+        vec![(0.0, 0.0, 5.0), (120.0, 0.0, 9.0), (280.0, 0.0, 6.0)],
+    ];
+    let falls: [(&str, fn(f64) -> f64); 3] = [
+        ("falls with the duty", |d| 200.0 * (1.0 - d).powi(2)),
+        ("falls with the duty", |d| 90.0 - 20.0 * d),
+        ("does not rise with the duty", |_| 100.0),
+    ];
+    for load in loads {
+        for (words, law) in falls {
+            let bench = stepped(&Bench {
+                load: load.clone(),
+                ..Bench::default()
+            });
+            let set = |n: usize| {
+                load.iter()
+                    .rev()
+                    .find(|step| step.0 <= n as f64)
+                    .map_or(5.0, |step| step.2)
+            };
+            let table = bench.run().with("i_load", (0..bench.rows).map(set).collect());
+            let table = replaced(table, "v_out", |d, _| law(d)).without(&["v_in", "i_out"]);
+            let found = ended(words, &table.measured(&OF_ROWS, &mut random), &model()).unwrap();
+            assert_eq!(found.findings.verdict, Verdict::Unexplained);
+            assert!(
+                found.findings.sentence.contains(words),
+                "{words}: {}",
+                found.findings.sentence
+            );
+            let null = found.attribution.null.chi2;
+            assert!(found.attribution.singles.iter().all(|single| single.state.chi2 == null));
+        }
+    }
+}
+
+/// A source that gives away a quarter, a counter of few steps, a load that pulls the voltage down as the duty rises: the voltage of each rises too
+/// little or falls, and each is a converter.
+#[test]
+fn what_a_converter_does_is_not_taken_for_a_voltage_that_does_not_rise() {
+    let mut random = Noise(72);
+    let weak = stepped(&Bench {
+        r_ds_on: 5.0,
+        load: vec![(0.0, 0.1, 0.0)],
+        ..Bench::default()
+    });
+    let mut coarse = stepped(&Bench::default());
+    for (_, duty) in &mut coarse.duty {
+        *duty = (*duty * 8.0).floor() / 8.0;
+    }
+    // as a controller does that holds the voltage, and a little too little
+    let mut held = stepped(&Bench {
+        dcr: 2.0,
+        ..Bench::default()
+    });
+    held.load = (held.duty.iter())
+        .map(|(row, d)| (*row as f64, 0.0, 100.0 * (*d - 0.25) + 1.0))
+        .collect();
+    let commanded = stepped(&Bench::default()).duty;
+    for (what, bench, load) in [
+        ("weak", &weak, "r_load"),
+        ("coarse", &coarse, "i_load"),
+        ("held", &held, "i_load"),
+    ] {
+        let set = |n: usize| bench.load.iter().rev().find(|step| step.0 <= n as f64);
+        let set = (0..bench.rows).map(|n| set(n).map_or(0.0, |(_, g, i)| if load == "r_load" { 1.0 / g } else { *i }));
+        let mut table = bench.run().with(load, set.collect());
+        for (n, duty) in table.column("duty").iter_mut().enumerate() {
+            *duty = bench::at(&commanded, n as isize, |step| step.0).1;
+        }
+        let table = table.without(&["v_in", "i_out"]).measured(&OF_ROWS, &mut random);
+        let found = ended(what, &table, &model()).unwrap();
+        assert!(
+            !found.findings.sentence.contains("rise"),
+            "{what}: {}",
+            found.findings.sentence
+        );
+        assert!(found.attribution.best.is_some(), "{what}");
+    }
+}
+
 #[test]
 fn settled_points_that_no_buck_gives_are_never_explained() {
     none_explains(settled_nonsense());

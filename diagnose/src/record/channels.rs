@@ -2,6 +2,10 @@
 
 /// Channels: `v_o`, `i_l`, `i_o`, `v_in`.
 pub const CHANNELS: usize = 4;
+/// Of the load's current among them.
+pub const LOAD_CURRENT: usize = 2;
+/// Of the source's voltage.
+pub const V_IN: usize = 3;
 /// Their names.
 pub const CHANNEL_NAMES: [&str; CHANNELS] = ["v_o", "i_l", "i_o", "v_in"];
 /// What the columns of a table call them.

@@ -10,7 +10,7 @@ use super::Record;
 
 /// How near to an edge is at it, as a share of the period.
 // 20 ns at 100 kHz: delays of a driver and of a comparator come to that, and a duty of three decimals to half of it
-const NEAR: f64 = 2e-3;
+pub(crate) const NEAR: f64 = 2e-3;
 
 /// Takes the voltages and the load currents of such rows out of a record over time, and says so. Where they are most of the rows and no current of
 /// the inductor stands beside them nothing would be left to compare: they stay, and the instant in the plant file decides.

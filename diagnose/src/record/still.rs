@@ -21,7 +21,8 @@ pub struct Slopes {
 
 /// The slopes of a record; nothing if its duty hardly moves, or it never stands still.
 pub fn slopes(record: &Record, ideal: &Ideal) -> Option<Slopes> {
-    let points = points(record, ideal);
+    let at = |(row, volts): (usize, f64)| (record.duty[row], volts);
+    let points: Vec<(f64, f64)> = points(record, ideal).into_iter().map(at).collect();
     let (low, high) = points
         .iter()
         .fold((1.0f64, 0.0f64), |(low, high), (d, _)| (low.min(*d), high.max(*d)));
@@ -46,17 +47,12 @@ pub fn slopes(record: &Record, ideal: &Ideal) -> Option<Slopes> {
     (slopes.own.is_finite() && slopes.other.is_finite()).then_some(slopes)
 }
 
-/// Duty and voltage of settled points, and of the ends of stretches in which duty and load stand still.
-fn points(record: &Record, ideal: &Ideal) -> Vec<(f64, f64)> {
+/// Rows and voltages of settled points, and of the ends of stretches in which duty and load stand still.
+pub fn points(record: &Record, ideal: &Ideal) -> Vec<(usize, f64)> {
     let volts = &record.measured[0];
     if record.settled {
-        return record
-            .duty
-            .iter()
-            .copied()
-            .zip(volts.iter().copied())
-            .filter(|(_, v)| v.is_finite())
-            .collect();
+        let points = volts.iter().copied().enumerate();
+        return points.filter(|(_, v)| v.is_finite()).collect();
     }
     let rested = (RESTED * ideal.swing()) as usize;
     let mut points = Vec::new();
@@ -71,7 +67,7 @@ fn points(record: &Record, ideal: &Ideal) -> Vec<(f64, f64)> {
             .filter(|v| v.is_finite())
             .collect();
         if tail.len() >= FEWEST {
-            points.push((record.duty[start], tail.iter().sum::<f64>() / tail.len() as f64));
+            points.push((start, tail.iter().sum::<f64>() / tail.len() as f64));
         }
         start = row;
     }

@@ -19,6 +19,9 @@ impl Terms {
     /// Two choices joined of which one says something of the other's condition: a choice of three.
     pub(crate) fn joined(&self, name: &'static str, x: Term, y: Term) -> Option<Term> {
         let [condition, yes, no] = self.choice(x).filter(|_| name == "bvor")?;
+        if let Some(choice) = self.spared(x, y) {
+            return Some(choice);
+        }
         if let Some(choice) = self.parted([condition, yes, no], y) {
             return Some(choice);
         }
@@ -39,6 +42,25 @@ impl Terms {
             .into_iter()
             .filter(|operand| !known.contains(operand));
         Some(self.choose(condition, yes, self.choose(self.all(rest), with(no, set), no)))
+    }
+
+    /// A flag joined with what is 0 wherever the flag is set, as a clamp whose lower end is 0 leaves of its three masks two.
+    fn spared(&self, flag: Term, y: Term) -> Option<Term> {
+        let (set, value) = self.flag(flag)?;
+        let [condition, yes, no] = self.choice(y)?;
+        let (is_zero, rest) = match (self.known(yes), self.known(no)) {
+            (Some(0), _) => (condition, no),
+            (_, Some(0)) => (self.not(condition), yes),
+            _ => return None,
+        };
+        let [own, all] = [set, is_zero].map(|condition| self.operands(false, [condition]));
+        if !own.iter().all(|operand| all.contains(operand)) {
+            return None;
+        }
+        let others = all.into_iter().filter(|operand| !own.contains(operand));
+        let otherwise = others.fold(self.truth(false), |any, operand| self.or(any, operand));
+        let [value, zero] = [value, 0].map(|bits| self.bits(bits, self.width(y)));
+        Some(self.choose(set, value, self.choose(otherwise, zero, rest)))
     }
 
     /// What two masks leave that are both 0 where a third one is, and of which elsewhere one is 0 where the other is not.

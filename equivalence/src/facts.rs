@@ -14,6 +14,7 @@ pub(crate) fn assumptions(spec: Spec<'_>, state: &State) -> Vec<Assumption> {
         if let Some(term) = slew_is_ordered(spec, path, own) {
             let command = path.named("previous_command");
             all.push(Assumption {
+                cases: Vec::new(),
                 term,
                 text: format!("fl({command} - s) is not above fl({command} + s)"),
             });
@@ -21,6 +22,7 @@ pub(crate) fn assumptions(spec: Spec<'_>, state: &State) -> Vec<Assumption> {
         if let Some(term) = raised_is_number(spec, path, own) {
             let cap = path.named("soft_cap");
             all.push(Assumption {
+                cases: Vec::new(),
                 term,
                 text: format!("fl({cap} + inc) is a number if {cap} is one between `from` and the upper limit"),
             });

@@ -3,7 +3,7 @@
 use crate::float::Float;
 use crate::machine::Kind;
 use crate::smt::{Arithmetic, Script, script};
-use crate::term::Term;
+use crate::term::{Term, Terms};
 
 /// One claim as a text that any solver of SMT-LIB 2 takes: `unsat` proves it, `sat` refutes it.
 #[derive(Debug, Clone)]
@@ -41,6 +41,8 @@ pub(crate) struct Pair {
 #[derive(Clone)]
 pub(crate) struct Assumption {
     pub term: Term,
+    /// Of which one holds, if the assumption is that: each is looked at alone, since half of an `or` is known in no term. Nothing otherwise.
+    pub cases: Vec<Term>,
     pub text: String,
 }
 
@@ -49,10 +51,7 @@ pub(crate) fn equal(float: Float<'_>, name: String, claim: String, pairs: &[Pair
     let terms = float.terms;
     let shown: Vec<Term> = pairs.iter().flat_map(|pair| [pair.emitted, pair.specified]).collect();
     let asserted: Vec<Term> = given.iter().map(|assumption| assumption.term).collect();
-    let same = pairs
-        .iter()
-        .map(|pair| terms.same_under(&asserted, pair.emitted, pair.specified));
-    let truth = terms.all(same);
+    let truth = terms.all(pairs.iter().map(|pair| same(terms, pair, given)));
     let script = script(terms, &asserted, truth, &shown, Arithmetic::Uninterpreted);
     let mut shown = inputs(float, &script);
     for pair in pairs {
@@ -70,6 +69,20 @@ pub(crate) fn equal(float: Float<'_>, name: String, claim: String, pairs: &[Pair
         assumptions: given.iter().map(|assumption| assumption.text.clone()).collect(),
         text: script.text,
         shown,
+    }
+}
+
+/// Whether a pair is the same where all assumptions hold.
+fn same(terms: &Terms, pair: &Pair, given: &[Assumption]) -> Term {
+    let plain = given.iter().filter(|assumption| assumption.cases.is_empty());
+    let plain: Vec<Term> = plain.map(|assumption| assumption.term).collect();
+    let under = |known: &[Term]| terms.same_under(known, pair.emitted, pair.specified);
+    match given.iter().find(|assumption| !assumption.cases.is_empty()) {
+        None => under(&plain),
+        Some(assumption) => terms.all(assumption.cases.iter().map(|case| {
+            let known = [plain.clone(), terms.operands(true, [*case])].concat();
+            terms.or(terms.not(*case), under(&known))
+        })),
     }
 }
 

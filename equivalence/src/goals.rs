@@ -48,8 +48,10 @@ fn numbers(spec: Spec<'_>, sensed: &Sensed, choices: &[Chosen]) -> Option<Assump
     let (terms, float) = (spec.terms, spec.float);
     let numbers = choices.iter().flat_map(|choice| &choice.numbers);
     let all: Vec<Term> = numbers.map(|x| terms.not(float.is_nan(*x))).collect();
+    let cases = vec![terms.not(sensed.sound), terms.all(all.iter().copied())];
     (!all.is_empty()).then(|| Assumption {
-        term: terms.or(terms.not(sensed.sound), terms.all(all)),
+        term: terms.or(cases[0], cases[1]),
+        cases,
         text: "of a sound state the network's output, and the quotient of its curve, are numbers".into(),
     })
 }

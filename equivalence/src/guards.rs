@@ -7,7 +7,7 @@ use crate::term::{Comparison, Op, Sort, Term, Terms, mask};
 
 impl Terms {
     /// Name and operands of an operation on two words.
-    fn of_words(&self, x: Term) -> Option<(&'static str, [Term; 2])> {
+    pub(crate) fn of_words(&self, x: Term) -> Option<(&'static str, [Term; 2])> {
         let node = self.node(x);
         match (&node.op, node.args.as_slice()) {
             (Op::Bits(name), &[x, y]) => Some((name, [x, y])),
@@ -64,7 +64,7 @@ impl Terms {
                 Some(1) => Some(self.not(self.bit(a, number))),
                 _ => Some(self.bit(a, number)),
             },
-            "bvsub" if is_sign => self.far(a, b),
+            "bvsub" if is_sign => self.far(a, b).or_else(|| self.near(a, b)),
             "bvlshr" => shift().map(|by| match number + by < width {
                 true => self.bit(a, number + by),
                 false => self.truth(false),
@@ -124,7 +124,7 @@ impl Terms {
     }
 
     /// The bits of the infinity of that width, of which the check is that there are numbers as wide.
-    fn infinity(&self, width: u32) -> Option<u64> {
+    pub(crate) fn infinity(&self, width: u32) -> Option<u64> {
         match width {
             32 => Some(f32::INFINITY.to_bits().into()),
             64 => Some(f64::INFINITY.to_bits()),

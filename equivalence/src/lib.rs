@@ -10,6 +10,7 @@ mod goal;
 mod goals;
 mod guards;
 mod helpers;
+mod limited;
 mod machine;
 mod refusal;
 mod run;

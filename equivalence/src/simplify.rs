@@ -40,6 +40,9 @@ impl Terms {
         {
             return Some(truth);
         }
+        if let Some(limited) = self.limited_choice(condition, yes, no) {
+            return Some(limited);
+        }
         // of a condition and its opposite the one that was made first
         let opposite = self.not(condition);
         if opposite < condition {
@@ -113,6 +116,7 @@ impl Terms {
             .or_else(|| self.counted(name, x, y))
             .or_else(|| self.of_one_choice(name, x, y))
             .or_else(|| self.masked(name, x, y))
+            .or_else(|| self.with_sign(name, x, y))
             .or_else(|| self.raised(name, x, y))
             .or_else(|| self.joined(name, x, y))
             .or_else(|| self.joined(name, y, x))

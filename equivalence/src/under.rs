@@ -21,6 +21,8 @@ impl Terms {
         for term in self.parts(claim) {
             if !anew.contains_key(&term) {
                 let made = self.again(term, &anew);
+                // it may have become one that is known itself
+                let made = anew.get(&made).copied().unwrap_or(made);
                 anew.insert(term, made);
             }
         }

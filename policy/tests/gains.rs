@@ -191,3 +191,43 @@ fn golden_duties_are_read_where_the_observation_tells_the_law() {
     // at the end of the clip of `e`, 20, its value may be any above
     assert!(golden.law[9].is_nan() && golden.law[10] == 3.0);
 }
+
+/// What observations say of the law: base and factors before scale and offset, and nothing at an end of a clip, behind which a value may be any.
+#[test]
+fn observations_tell_base_and_factors_between_the_ends_of_a_clip() {
+    let gains = "base = \"0.25\"\ngains = [{ source = \"v_ref - v_out\", clip = [-1, 1] }, { feature = \"e_del\", clip = [-1, 1] }, { clip = [-1, 1] }]";
+    let policy = with(gains).policy();
+    let Head::Schedule(head) = &policy.head else { panic!() };
+    assert!(policy.log_tells_answers());
+    // o = 0.2 (v_ref - v_out), clipped at 20 to either side; `e_del` is the other feature as it is
+    let told = |e: f32| policy::law_told(head, &policy.features, &[e, -7.5]).unwrap();
+    let law = told(2.0);
+    assert_eq!((law[0], law[2], law[3]), (0.25, -7.5, 1.0));
+    assert!((law[1] - 10.0).abs() < 1e-9 && law.len() == 4, "{law:?}");
+    assert!((told(19.9)[1] - 99.5).abs() < 1e-5 && (told(-19.9)[1] + 99.5).abs() < 1e-5);
+    for end in [20.0, -20.0, 19.99999, -19.99999] {
+        assert!(told(end)[1].is_nan(), "{end}");
+    }
+    // two rows, in their order
+    let rows = policy::law_told(head, &policy.features, &[2.0, 1.0, 4.0, 3.0]).unwrap();
+    assert_eq!((rows.len(), rows[2], rows[6]), (8, 1.0, 3.0));
+    // what no feature passes on is named as the contract has it; a filter in between passes on something else
+    for (law, named) in [
+        (
+            "base = \"0.25 + 0.001 * i_out\"\ngains = [{ source = \"v_ref - v_out\", clip = [-1, 1] }, { clip = [-1, 1] }, { clip = [-1, 1] }]",
+            "0.25 + 0.001 * i_out",
+        ),
+        (
+            "gains = [{ source = \"i_out\", clip = [-1, 1] }, { clip = [-1, 1] }, { clip = [-1, 1] }]",
+            "i_out",
+        ),
+    ] {
+        let policy = with(law).policy();
+        let Head::Schedule(head) = &policy.head else { panic!() };
+        assert!(!policy.log_tells_answers());
+        assert_eq!(
+            policy::law_told(head, &policy.features, &[0.0, 0.0]).unwrap_err(),
+            named
+        );
+    }
+}

@@ -138,3 +138,50 @@ fn golden_vectors_that_cannot_be_are_refused() {
         &["golden_decisions", "0 to 1"],
     );
 }
+
+/// Answers that were made of a log are those that a contract reads: actions, duties, and what several outputs call them.
+#[test]
+fn answers_that_are_written_are_read_again() {
+    let written = |policy: &policy::Policy, golden: &policy::Golden| {
+        let bytes = policy::golden_file(policy, golden).unwrap();
+        let tensors = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+        let mut all: Vec<(String, Dtype, Vec<usize>, Vec<u8>)> = (tensors.iter())
+            .map(|(name, view)| {
+                (
+                    name.to_owned(),
+                    view.dtype(),
+                    view.shape().to_vec(),
+                    view.data().to_vec(),
+                )
+            })
+            .collect();
+        all.sort_by(|a, b| a.0.cmp(&b.0));
+        all
+    };
+    let obs = f32_tensor("obs", &[2, 2], &[1.0, 5.0, -2.0, -10.0]);
+    let action = raw_tensor(
+        "action",
+        Dtype::I32,
+        &[2],
+        [2i32, 0].iter().flat_map(|v| v.to_le_bytes()).collect(),
+    );
+    let policy = Folder::new().golden(&[obs.clone(), action.clone()]).policy();
+    let golden = policy.golden.clone().unwrap();
+    let of = |tensor: &Tensor| {
+        (
+            tensor.name.clone(),
+            tensor.dtype,
+            tensor.shape.clone(),
+            tensor.data.clone(),
+        )
+    };
+    assert_eq!(written(&policy, &golden), [of(&action), of(&obs)]);
+    // duties in the place of actions
+    let duty = f32_tensor("duty", &[2], &[0.5, 0.44]);
+    let duties = policy::Golden {
+        action_indices: Vec::new(),
+        duties: vec![0.5, 0.44],
+        ..golden
+    };
+    assert_eq!(written(&policy, &duties), [of(&duty), of(&obs)]);
+}

@@ -27,10 +27,11 @@ use results::Results;
 use run::{End, Switched};
 
 const USAGE: &str = "\
-usage: cargo xtask mutants --seed S [--sample N] [--again [--with P]] [--table]
+usage: cargo xtask mutants --seed S [--sample N] [--within T] [--again [--with P]] [--table]
 
   --seed S     which mutants are drawn
   --sample N   so many of each of interp, policy and codegen (50)
+  --within T   only by tests that take T seconds at most: a first look, what they do not catch stays open
   --again      those that no test caught once more: a test may be new
   --with P     only by the tests that begin so, as `policy/` or `policy/chains: a_row`; what they do not catch stays as it was
   --table      only what is known, nothing is run
@@ -50,6 +51,7 @@ const LONGEST: Duration = Duration::from_secs(900);
 struct Options {
     seed: u64,
     sample: usize,
+    within: Option<Duration>,
     again: bool,
     with: String,
     table: bool,
@@ -92,6 +94,7 @@ fn parse(arguments: &[String]) -> Result<Options, String> {
         match word.as_str() {
             "--seed" => seed = Some(number(&mut words)?),
             "--sample" => options.sample = usize::try_from(number(&mut words)?).unwrap_or(usize::MAX),
+            "--within" => options.within = Some(Duration::from_secs(number(&mut words)?)),
             "--again" => options.again = true,
             "--with" => options.with = words.next().ok_or("`--with` takes the name of a program")?.clone(),
             "--table" => options.table = true,
@@ -153,7 +156,9 @@ fn work(options: &Options, folders: &Folders) -> Result<String, String> {
         .into_iter()
         .filter(|test| test.label().starts_with(&options.with))
         .collect();
-    let asked = measured(&tests, folders, built.len())?;
+    let mut asked = measured(&tests, folders, built.len())?;
+    asked.retain(|asked| options.within.is_none_or(|most| asked.seconds <= most));
+    let asks_all = options.with.is_empty() && options.within.is_none();
     let sample = sample(&population, &results, options.sample);
     let names = draw::names(&population);
     // an equal one passes whatever it is asked, and costs more than a hundred others
@@ -172,7 +177,7 @@ fn work(options: &Options, folders: &Folders) -> Result<String, String> {
         if !is_known {
             let (end, by, seconds) = try_one(number, &asked)?;
             say(&format!("{end}: {key} {by} ({seconds:.1} s)"));
-            if options.with.is_empty() || results::is_caught(end) {
+            if asks_all || results::is_caught(end) {
                 results.add(&key, end, &by, seconds)?;
             }
         }
@@ -312,6 +317,8 @@ mod tests {
         let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
         let options = parse(&words("--seed 7 --sample 20 --again")).unwrap();
         assert_eq!((options.seed, options.sample, options.again), (7, 20, true));
+        let first_look = parse(&words("--seed 7 --within 3")).unwrap();
+        assert_eq!((options.within, first_look.within), (None, Some(Duration::from_secs(3))));
         assert!(parse(&words("--sample 3")).unwrap_err().contains("--seed"));
         assert!(parse(&words("--seed x")).unwrap_err().contains("`x`"));
         assert!(parse(&words("--sede 1")).unwrap_err().contains("`--sede`"));

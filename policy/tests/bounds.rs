@@ -320,4 +320,24 @@ fn rounding_inwards_brackets_and_nearest_is_between() {
     assert_eq!(up_f32(1e39), f32::INFINITY);
     assert_eq!(down_f32(1e39), f32::MAX);
     assert_eq!(inward_f32(Interval { low: 0.4, high: 0.4 }), None);
+    // one number is enough
+    assert_eq!(inward_f32(Interval { low: 0.5, high: 0.5 }), Some((0.5, 0.5)));
+}
+
+#[test]
+fn each_format_rounds_to_its_own_numbers() {
+    use policy::Scalar::{F32, F64};
+    // 0.9 lies between two of binary32, and is one of binary64
+    let (below, above) = (f64::from(0.9_f32), f64::from(0.9_f32.next_up()));
+    assert_eq!((F32.down(0.9), F32.nearest(0.9), F32.up(0.9)), (below, below, above));
+    assert_eq!((F64.down(0.9), F64.nearest(0.9), F64.up(0.9)), (0.9, 0.9, 0.9));
+    for x in [0.0, 0.5, -0.5, 1.0, -3e8] {
+        let wide = |x: f32| f64::from(x);
+        let of_32 = x as f32;
+        assert_eq!(
+            (F32.next_down(x), F32.next_up(x)),
+            (wide(of_32.next_down()), wide(of_32.next_up()))
+        );
+        assert_eq!((F64.next_down(x), F64.next_up(x)), (x.next_down(), x.next_up()));
+    }
 }

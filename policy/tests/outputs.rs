@@ -324,3 +324,51 @@ fn one_output_is_written_without_a_list() {
         &["too few outputs", "[actions], [limits] and [fallback]"],
     );
 }
+
+#[test]
+fn one_output_is_taken_by_its_name() {
+    let several = policy(&folder(4));
+    let chosen = |policy: &Policy, name: Option<&str>| {
+        policy
+            .chosen_output(name)
+            .map_err(|message| toml_input::Faults::from(message).to_string())
+    };
+    assert_eq!(chosen(&several, Some("right")), Ok(1));
+    assert_eq!(chosen(&several, Some("left")), Ok(0));
+    let none = chosen(&several, None).unwrap_err();
+    assert!(
+        none.contains("several outputs") && none.contains("outputs left, right"),
+        "{none}"
+    );
+    let wrong = chosen(&several, Some("rigth")).unwrap_err();
+    assert!(
+        wrong.contains("one of left, right") && wrong.contains("`right`"),
+        "{wrong}"
+    );
+    let one = Folder::new().policy();
+    assert_eq!(chosen(&one, None), Ok(0));
+    let named = chosen(&one, Some("left")).unwrap_err();
+    assert!(named.contains("left") && named.contains("no name"), "{named}");
+    // of a place that there is not it is the first
+    let names = |policy: &Policy| [0, 1, 2].map(|index| policy.path(index).named("duty"));
+    assert_eq!(names(&several), ["duty_left", "duty_right", "duty_left"]);
+    assert_eq!(names(&one), ["duty", "duty", "duty"]);
+}
+
+#[test]
+fn a_mapping_is_put_before_the_output_of_its_index() {
+    let several = policy(&folder(4));
+    let mut mapping = *several.path(0).mapping.unwrap();
+    mapping.coefficients.b = 0.125;
+    let b = |policy: &Policy| {
+        policy
+            .paths()
+            .iter()
+            .map(|path| path.mapping.map(|own| own.coefficients.b))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(b(&several.clone().with_mapping(1, mapping)), [Some(0.0), Some(0.125)]);
+    assert_eq!(b(&several.clone().with_mapping(0, mapping)), [Some(0.125), None]);
+    assert_eq!(b(&several.with_mapping(2, mapping)), [Some(0.0), None]);
+    assert_eq!(b(&Folder::new().policy().with_mapping(0, mapping)), [Some(0.125)]);
+}

@@ -259,7 +259,8 @@ fn a_voltage_that_does_not_rise_with_the_duty_is_not_searched() {
         vec![(0.0, 0.0, 5.0)],
         vec![(0.0, 0.0, 5.0), (120.0, 0.0, 9.0), (280.0, 0.0, 6.0)],
     ];
-    let falls: [(&str, fn(f64) -> f64); 3] = [
+    type Law = fn(f64) -> f64;
+    let falls: [(&str, Law); 3] = [
         ("falls with the duty", |d| 200.0 * (1.0 - d).powi(2)),
         ("falls with the duty", |d| 90.0 - 20.0 * d),
         ("does not rise with the duty", |_| 100.0),

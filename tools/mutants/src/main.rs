@@ -318,7 +318,10 @@ mod tests {
         let options = parse(&words("--seed 7 --sample 20 --again")).unwrap();
         assert_eq!((options.seed, options.sample, options.again), (7, 20, true));
         let first_look = parse(&words("--seed 7 --within 3")).unwrap();
-        assert_eq!((options.within, first_look.within), (None, Some(Duration::from_secs(3))));
+        assert_eq!(
+            (options.within, first_look.within),
+            (None, Some(Duration::from_secs(3)))
+        );
         assert!(parse(&words("--sample 3")).unwrap_err().contains("--seed"));
         assert!(parse(&words("--seed x")).unwrap_err().contains("`x`"));
         assert!(parse(&words("--sede 1")).unwrap_err().contains("`--sede`"));

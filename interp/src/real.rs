@@ -274,5 +274,11 @@ mod tests {
         assert!(!range.clamps(2.0) && range.clamps((-1.0_f32).next_down()));
         assert_eq!(range.clamp(7.0), 2.0);
         assert_eq!(range.clamp(-7.0), -1.0);
+        // a zero at an end is not beyond it, whatever its sign: section 4 leaves it as it is
+        let zeros = [
+            Range { lo: -1.0_f32, hi: 0.0 }.clamp(-0.0),
+            Range { lo: 0.0_f32, hi: 1.0 }.clamp(-0.0),
+        ];
+        assert_eq!(zeros.map(f32::to_bits), [(-0.0_f32).to_bits(); 2]);
     }
 }

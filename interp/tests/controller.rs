@@ -124,6 +124,7 @@ fn one_bad_signal_holds_that_signal_only() {
     c.step(&[Physical(3.0), Physical(1.0)]).unwrap();
     let trace = c.step(&[Physical(11.0), Physical(2.0)]).unwrap();
     assert_eq!(trace.valid, [false, true]);
+    assert_eq!(trace.measured, [11.0, 2.0], "as it came, held or not");
     assert_eq!(trace.observation[0], 5.0, "held 3 + new 2");
     assert_eq!(c.state().held, [3.0, 2.0]);
 }
@@ -312,6 +313,8 @@ fn wrong_arguments_are_errors_and_change_nothing() {
     );
     let wrong = c.q_values(&ndarray::aview1(&[0.0, 0.0])).unwrap_err();
     assert_eq!(wrong, InputError::ObservationLength { expected: 1, found: 2 });
+    // each of several outputs: there is one
+    assert_eq!(c.decide_each(&ndarray::aview1(&[5.0, 3.0])), None);
     assert_eq!(c.state_words(), before);
 }
 

@@ -219,3 +219,13 @@ fn coefficients_and_check_word_of_one_pattern_are_not_sound() {
         assert_seen(&c, &state, &format!("{pattern:x}"));
     }
 }
+
+/// Two signals and two duties that no step reads, then what may be set: three coefficients or four, rounded inwards.
+#[test]
+fn sound_ends_stand_in_the_order_of_the_words() {
+    let ends = mapped(THREE_TERMS).sound_ends();
+    assert_eq!(ends[..4], [Some((0.0, 10.0)), Some((-5.0, 5.0)), None, None]);
+    let tenth = 0.1_f32.next_down();
+    assert_eq!(ends[4..], [Some((0.25, 2.0)), Some((-tenth, tenth)), Some((-0.5, 0.5))]);
+    assert_eq!(mapped(&four_terms()).sound_ends().len(), ends.len() + 1);
+}

@@ -156,7 +156,10 @@ fn answers_of_the_trainer_are_compared_row_by_row() {
     assert_eq!((result.actions_equal, result.actions_compared), (3, 3));
     assert_eq!(result.worst_relative_error, Some(0.0));
     assert!(result.passed() && refusal(&policy).is_none());
-    assert!(result.to_string().starts_with("action equal in 3 of 3"), "{result}");
+    assert_eq!(
+        result.to_string(),
+        "action equal in 3 of 3, largest relative error of Q 0.0e0 (allowed 1e-4)"
+    );
     // without actions of the trainer none are spoken of
     policy.golden = Some(Golden {
         action_indices: Vec::new(),
@@ -216,6 +219,58 @@ fn an_activation_that_gives_every_golden_answer_is_the_hint() {
         "{}",
         result.hint()
     );
+    // where the answers are given nobody asks for another
+    let tanh = policy::Activation::EACH.iter().find(|each| each.word() == "tanh");
+    policy.layers[0].activation = *tanh.unwrap();
+    let result = golden_result(&policy).unwrap();
+    assert!(result.passed() && result.activations.is_empty(), "{result}");
+}
+
+/// Actions that are another than the most frequent one, here and there among them: from twenty on they tell an activation.
+#[test]
+fn few_actions_of_another_kind_tell_no_activation() {
+    let contract = format!(
+        "name = \"deep\"\nsample_period = 0.25\n[[signal]]\nname = \"u\"\nrange = [-40.0, 40.0]\n[[feature]]\nname = \"x\"\nsource = \"u\"\n\
+         [network]\nweights = \"weights.safetensors\"\nhidden_activation = \"relu\"\n[actions]\nduties = [0.25, 0.75]\n{PLAIN}"
+    );
+    let layer = |outputs, weights, bias| Dense {
+        inputs: 1,
+        outputs,
+        weights,
+        bias,
+    };
+    // Q = (0.5, y): behind ReLU action 1 for x above 0.5 alone
+    let layers = [layer(1, &[1.0][..], &[0.0][..]), layer(2, &[0.0, 1.0], &[0.5, 0.0])];
+    let mut policy = load(&contract, &[], &layers);
+    let with = |telling: usize| {
+        let ones: Vec<usize> = (0..telling).map(|n| 2 * n).collect();
+        let count = 2 * telling + 20;
+        let observations = (0..count).map(|n| if ones.contains(&n) { 0.4 } else { -1.0 }).collect();
+        Golden {
+            count,
+            outside: 0,
+            observations,
+            q_values: Vec::new(),
+            action_indices: (0..count).map(|n| u32::from(ones.contains(&n))).collect(),
+            duties: Vec::new(),
+            law: Vec::new(),
+            outputs: Vec::new(),
+            tolerance: 1e-5,
+            decisions: None,
+            duty_error: None,
+        }
+    };
+    // sigmoid(0.4) is 0.6, above 0.5, and sigmoid(-1) 0.27 is not: with it all actions are given
+    policy.golden = Some(with(20));
+    let told = golden_result(&policy).unwrap();
+    assert!(
+        told.activations.contains(&"\"sigmoid\"".to_owned()),
+        "{:?}",
+        told.activations
+    );
+    policy.golden = Some(with(19));
+    let told = golden_result(&policy).unwrap();
+    assert!(!told.passed() && told.activations.is_empty(), "{:?}", told.activations);
 }
 
 /// The law is `u / 16`, the network adds a quarter of the duty to it where u is above 5.

@@ -172,6 +172,24 @@ fn gains_that_are_off_are_told_as_a_share_of_their_range() {
     assert_eq!(said(policy(), answers(0.2, Some(0.125))), None);
 }
 
+/// The duty of a law is a share of its limits, from 0.125 to 0.875.
+#[test]
+fn a_duty_of_a_law_is_told_as_a_share_of_its_limits() {
+    let policy = schedule("base = \"0.25\"\ngains = [{ source = \"u\", clip = [-1, 1], scale = 0.125 }]");
+    let answers = Golden {
+        // the network says 0.5: 0.25 + 0.5 / 8 * 2 is 0.375, and 0.1875 more is a quarter of the limits
+        duties: vec![0.375, 0.5625],
+        law: vec![0.25, 2.0, 0.25, 2.0],
+        ..golden(&[2.0, 2.0], 2)
+    };
+    let result = interp::golden::judge(&answers, &policy.head, &[&[0.5], &[0.5]]);
+    assert_eq!((result.worst_duty_error, result.limits_range), (Some(0.25), Some(0.75)));
+    holds(
+        &result.to_string(),
+        &["DIFFERENT: largest error of the duty 2.5e-1 of the range of the limits, 0.75 (allowed 1e-4)"],
+    );
+}
+
 #[test]
 fn a_hint_names_activations_alone_where_answers_tell_them_apart() {
     // one layer has no hidden activation to be another

@@ -176,4 +176,7 @@ fn gains_in_a_format_are_held_against_those_of_the_trainers_outputs() {
         panic!("no schedule");
     };
     assert_eq!((found.observations, found.largest), (2, 0.0));
+    // of equal errors the first row and the first gain
+    let worst = found.worst.unwrap();
+    assert_eq!((worst.row, worst.gain), (0, 0));
 }

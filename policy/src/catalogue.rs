@@ -292,3 +292,16 @@ pub(crate) fn bad_unit(found: &str) -> Message {
 pub(crate) fn expression(problem: &str) -> Message {
     Message::new(problem)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::tidy;
+
+    #[test]
+    fn the_noise_of_a_quotient_is_left_out_and_nothing_else() {
+        assert_eq!(tidy(0.440_000_000_000_000_06), 0.44);
+        for x in [0.44, 123.456_789_012, 1e-12, 10_000.000_1, 0.0, -0.07] {
+            assert_eq!(tidy(x), x);
+        }
+    }
+}

@@ -358,3 +358,18 @@ fn a_feature_that_could_overflow_is_named() {
     let folder = Folder::new().replace("scale = 0.2\nclip = [-20.0, 20.0]", "scale = 1e37");
     assert_says(&folder.fault(), &["feature `e` could leave the range of f32", "narrow"]);
 }
+
+/// Codes are whole numbers of binary32 up to 2^24, which is one itself.
+#[test]
+fn the_largest_code_is_taken_and_the_next_one_is_not() {
+    let unit = "unit = \"V\"\nrange = [0.0, 250.0]";
+    let with = |high: &str| {
+        let adc = format!("unit = \"V\"\nadc = {{ gain = 1.0, offset = 0.0 }}\nrange = [0.0, {high}]");
+        // the clip keeps the network's inputs where they were
+        Folder::new().replace(unit, &adc)
+    };
+    let policy = with("16777216.0").policy();
+    assert_eq!(policy.signals[0].range.high, 16_777_216.0);
+    let fault = with("16777218.0").fault();
+    assert_says(&fault, &["16777218"]);
+}

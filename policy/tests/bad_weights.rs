@@ -340,12 +340,24 @@ fn malformed_files_say_what_is_wrong() {
 fn a_file_that_ends_early_says_by_how_much() {
     let folder = Folder::new();
     let whole = std::fs::read(folder.path().join(FILE)).unwrap();
-    let short = &whole[..whole.len() - 10];
-    let fault = folder.file(FILE, short).fault();
+    let header = u64::from_le_bytes(*whole.first_chunk().unwrap()) as usize;
+    let data = whole.len() - 8 - header;
+    let mut folder = folder;
+    for missing in [10, 1] {
+        folder = folder.file(FILE, &whole[..whole.len() - missing]);
+        let found = format!("{} bytes of data", data - missing);
+        let expected = format!("{data} bytes of data, as the header says");
+        assert_whole_file(
+            &folder.fault(),
+            FILE,
+            &["cut off", &found, &expected, "copy or download"],
+        );
+    }
+    // with the header at its end it is a file all the same
     assert_whole_file(
-        &fault,
+        &folder.file(FILE, &with_header("{}", &[])).fault(),
         FILE,
-        &["cut off", "bytes of data, as the header says", "copy or download"],
+        &["holds no tensors"],
     );
 }
 

@@ -324,6 +324,16 @@ fn rounding_inwards_brackets_and_nearest_is_between() {
     assert_eq!(inward_f32(Interval { low: 0.5, high: 0.5 }), Some((0.5, 0.5)));
 }
 
+/// e from -150 to 100, and an offset that is added whatever number it is.
+#[test]
+fn an_offset_moves_the_bound_of_an_observation() {
+    for offset in [1.0, -1.0, 0.5, 2.0] {
+        let folder = Folder::new().replace("scale = 0.2\nclip = [-20.0, 20.0]", &format!("offset = {offset:?}"));
+        let bound = folder.policy().features[0].bound;
+        assert_eq!((bound.low, bound.high), (offset - 150.0, offset + 100.0));
+    }
+}
+
 #[test]
 fn each_format_rounds_to_its_own_numbers() {
     use policy::Scalar::{F32, F64};

@@ -245,6 +245,13 @@ fn a_circuit_with_a_voltage_to_hold_has_a_surplus() {
     let load = policy.signals[1].range;
     let range = observer.range(Estimate::Surplus);
     assert_eq!((range.low, range.high), (-load.high, 60.0 - load.low));
+    // none of a current that never falls to 0 may reach the output, too, and none of one that never rises to it
+    let surplus = |current: &str| {
+        let folder = boosted("topology = \"boost\"\nhold = 400.0").replace("current = [0.0, 60.0]", current);
+        folder.policy().observers[0].range(Estimate::Surplus)
+    };
+    assert_eq!(surplus("current = [2.0, 60.0]").low, -load.high);
+    assert_eq!(surplus("current = [-60.0, -2.0]").high, -load.low);
     assert_eq!(observer.words(), 3, "the surplus is no state");
     assert_eq!(observer.estimates().count(), 4);
     assert!(policy.features[0].source.reads(Input::Estimate(0, Estimate::Surplus)));

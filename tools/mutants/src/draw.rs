@@ -94,6 +94,11 @@ pub fn population(root: &Path, seed: u64) -> Result<Population, String> {
     Ok(all)
 }
 
+/// The unit tests of a module, where they have a file of their own: what they are given is no code of the crate.
+fn is_of_tests(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name == "tests.rs")
+}
+
 fn sources(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let entries = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
@@ -102,7 +107,7 @@ fn sources(folder: &Path) -> Result<Vec<PathBuf>, String> {
     for path in paths {
         if path.is_dir() {
             files.extend(sources(&path)?);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
+        } else if path.extension().is_some_and(|extension| extension == "rs") && !is_of_tests(&path) {
             files.push(path);
         }
     }

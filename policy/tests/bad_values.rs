@@ -373,3 +373,15 @@ fn the_largest_code_is_taken_and_the_next_one_is_not() {
     let fault = with("16777218.0").fault();
     assert_says(&fault, &["16777218"]);
 }
+
+/// A time constant may be a million periods, and no more.
+#[test]
+fn the_longest_time_constant_is_taken() {
+    let folder = |seconds: f64| {
+        let filters = format!("filters = [{{ low_pass = {{ time_constant = {seconds:?} }} }}]");
+        Folder::new().replace("filters = [{ delay = 1 }]", &filters)
+    };
+    let longest = 1e-4 * 1e6;
+    assert!(folder(longest).load().is_ok());
+    assert_says(&folder(longest + 1e-9).fault(), &["the time constant is out of range"]);
+}

@@ -2,6 +2,7 @@
 
 mod common;
 use common::*;
+use safetensors::Dtype;
 
 fn names(tensors: &[Tensor]) -> Vec<String> {
     let layers = Folder::new().tensors(tensors).policy().layers;
@@ -298,4 +299,41 @@ fn many_equal_layers_that_never_fit_are_refused_at_once() {
         &["shape [4, 4]", "shape [4, 2]"],
     );
     assert!(start.elapsed().as_secs() < 5);
+}
+
+/// Each way in which a trainer names the network that it keeps beside the one in use; a name that only begins or ends alike is another one's.
+#[test]
+fn target_networks_are_known_by_a_part_of_their_names() {
+    let own = ["net.0", "net.2", "net.4"];
+    for target in ["target", "target_net", "q_target", "agent.target.q", "agent/q_target"] {
+        let stems = [0, 2, 4].map(|n| format!("{target}.{n}"));
+        let both = [three(stems.each_ref().map(String::as_str)), three(own)].concat();
+        assert_eq!(names(&both), own, "{target}");
+        assert!(notes(&both).contains("passed over as a target network"), "{target}");
+    }
+    for other in ["targets", "retarget", "q_targeted"] {
+        let stems = [0, 2, 4].map(|n| format!("{other}.{n}"));
+        let both = [three(stems.each_ref().map(String::as_str)), three(own)].concat();
+        let fault = Folder::new().tensors(&both).fault();
+        assert_says(&fault, &["more than one chain"]);
+    }
+}
+
+/// A file may hold its tensors in any order, as by the width of their elements; they are told by name.
+#[test]
+fn tensors_of_a_file_are_told_in_the_order_of_their_names() {
+    let wide = raw_tensor(
+        "b",
+        Dtype::F64,
+        &[2],
+        [0.5_f64, -2.0].iter().flat_map(|x| x.to_le_bytes()).collect(),
+    );
+    let bytes = encode(&[f32_tensor("c", &[1], &[3.0]), wide, f32_tensor("a", &[1], &[1.0])]);
+    let tensors = policy::named_tensors(&"weights.safetensors".into(), bytes).unwrap();
+    let told: Vec<_> = tensors
+        .into_iter()
+        .map(|tensor| (tensor.name, tensor.values.unwrap()))
+        .collect();
+    let expected = [("a", vec![1.0]), ("b", vec![0.5, -2.0]), ("c", vec![3.0])];
+    assert_eq!(told, expected.map(|(name, values)| (name.to_owned(), values)));
 }

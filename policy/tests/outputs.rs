@@ -372,3 +372,30 @@ fn a_mapping_is_put_before_the_output_of_its_index() {
     assert_eq!(b(&several.with_mapping(2, mapping)), [Some(0.0), None]);
     assert_eq!(b(&Folder::new().policy().with_mapping(0, mapping)), [Some(0.125)]);
 }
+
+#[test]
+fn golden_duties_of_an_output_may_be_a_column() {
+    let duties = |shape: &[usize]| {
+        let duties = common::f32_tensor("duty_right", shape, &[0.5, 0.625, 0.75]);
+        let actions = common::raw_tensor(
+            "action_left",
+            safetensors::Dtype::I32,
+            &[3],
+            [0i32, 1, 2].iter().flat_map(|x| x.to_le_bytes()).collect(),
+        );
+        let golden = policy(&with_golden(&[actions, duties])).golden.unwrap();
+        golden.outputs[1].duties.clone()
+    };
+    assert_eq!(duties(&[3, 1]), [0.5, 0.625, 0.75]);
+    assert_eq!(duties(&[3]), [0.5, 0.625, 0.75]);
+}
+
+/// The stand-in of a faulty contract has a field for each name, and a name that is given twice has one.
+#[test]
+fn a_faulty_contract_still_tells_the_names_of_its_outputs() {
+    let names = |folder: &Folder| load(folder).unwrap_err().skeleton.outputs;
+    let faulty = folder(4).replace("hold = 3", "hold = -3");
+    assert_eq!(names(&faulty), [Some("left".to_owned()), Some("right".to_owned())]);
+    let twice = folder(4).replace("name = \"right\"", "name = \"left\"");
+    assert_eq!(names(&twice), [Some("left".to_owned()), None]);
+}

@@ -140,3 +140,15 @@ fn formulas_show_filters_scale_and_offset() {
         "100 - v_out"
     );
 }
+
+/// Duties of many actions stand in lines of twelve, one for each output.
+#[test]
+fn many_duties_are_broken_into_lines() {
+    let network = [dense("net.0", 4, 2), dense("net.2", 30, 4)].concat();
+    let folder = Folder::new().tensors(&network);
+    let text = scaffold(&folder.path().join("weights.safetensors")).unwrap();
+    let duties = text.split_once("\nduties = [").unwrap().1.split_once(']').unwrap().0;
+    let rows: Vec<usize> = duties.split(",\n").map(|row| row.matches("\"TODO\"").count()).collect();
+    assert_eq!(rows, [12, 12, 6], "{duties}");
+    assert!(!duties.starts_with(','), "{duties}");
+}

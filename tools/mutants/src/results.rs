@@ -65,7 +65,7 @@ impl Results {
     }
 
     /// Counts for each crate, and the mutants that no test caught; `equal` are the
-    /// [names](crate::draw::names) of those that a person judged to change nothing.
+    /// [names](crate::draw::names) of those that a person judged to change nothing. Below each stands its name for that list.
     pub fn table(&self, sample: &[Drawn], names: &BTreeMap<String, String>, equal: &BTreeSet<String>) -> String {
         let mut text = String::from(
             "| crate | mutants | caught | change nothing | missed | caught of those that change something |\n",
@@ -74,19 +74,19 @@ impl Results {
         let mut left = String::new();
         for krate in CRATES {
             let own: Vec<&Drawn> = sample.iter().filter(|drawn| drawn.krate == krate).collect();
-            let (mut caught, mut same, mut missed) = (0, 0, 0);
+            let (mut caught, mut same, mut missed) = (0, 0, 0_usize);
             for key in own.iter().map(|drawn| drawn.key()) {
                 match self.of(&key) {
                     Some(result) if is_caught(result) => caught += 1,
                     Some(_) if names.get(&key).is_some_and(|name| equal.contains(name)) => same += 1,
-                    Some(result) => {
-                        missed += 1;
-                        left.push_str(&format!("{result}: {key}\n"));
+                    result => {
+                        missed += usize::from(result.is_some());
+                        let (result, name) = (result.unwrap_or("not run"), names.get(&key).map_or("", String::as_str));
+                        left.push_str(&format!("{result}: {key}\n- ``{name} ``\n"));
                     }
-                    None => left.push_str(&format!("not run: {key}\n")),
                 }
             }
-            let share = 100.0 * f64::from(caught) / f64::from(caught + missed).max(1.0);
+            let share = 100.0 * caught as f64 / (caught + missed).max(1) as f64;
             let count = own.len();
             text.push_str(&format!(
                 "| `{krate}` | {count} | {caught} | {same} | {missed} | {share:.1} % |\n"

@@ -5,24 +5,16 @@
 #[allow(dead_code)] // another file of tests has the rest
 mod common;
 
-use common::{Dense, PLAIN, load, threshold};
+use common::{PLAIN, actor, threshold, vectors};
 use interp::decisions::{Choices, Decisions, decisions};
 use policy::{Golden, NumericFormat, Policy};
 
 /// Vectors of one observation each; the tolerance is that of a contract.
 fn golden(observations: &[f32], q_values: &[f32], actions: &[u32]) -> Golden {
     Golden {
-        count: observations.len(),
-        outside: 0,
-        observations: observations.to_vec(),
         q_values: q_values.to_vec(),
         action_indices: actions.to_vec(),
-        duties: Vec::new(),
-        law: Vec::new(),
-        outputs: Vec::new(),
-        tolerance: 1e-4,
-        decisions: None,
-        duty_error: None,
+        ..vectors(observations.len(), observations)
     }
 }
 
@@ -124,19 +116,8 @@ fn without_q_values_the_network_itself_in_binary64_says_what_is_given_up() {
     assert!(decisions(&plain, None).is_none(), "nothing without golden vectors");
 }
 
-/// y = x, clipped to 0.25 and 0.75: the head spans half of the duty.
-fn actor(golden: Golden) -> Policy {
-    let contract = format!(
-        "name = \"actor\"\nsample_period = 0.25\n[[signal]]\nname = \"u\"\nrange = [0.0, 1.0]\n[[feature]]\nname = \"x\"\n\
-         source = \"u\"\n[network]\nweights = \"weights.safetensors\"\n[actions]\ncontinuous = {{ clip = [0.25, 0.75] }}\n{PLAIN}"
-    );
-    let network = Dense {
-        inputs: 1,
-        outputs: 1,
-        weights: &[1.0],
-        bias: &[0.0],
-    };
-    let mut policy = load(&contract, &[], &[network]);
+fn acting(golden: Golden) -> Policy {
+    let mut policy = actor();
     policy.golden = Some(golden);
     policy
 }
@@ -151,7 +132,7 @@ fn with_duties(duties: &[f32]) -> Golden {
 #[test]
 fn duties_are_compared_as_shares_of_the_heads_range() {
     // 0.5, 0.5 and, clipped, 0.75 in the network
-    let found = decisions(&actor(with_duties(&[0.5, 0.625, 0.75])), None).unwrap();
+    let found = decisions(&acting(with_duties(&[0.5, 0.625, 0.75])), None).unwrap();
     assert_eq!(
         (found.remedy(), found.numeric_format()),
         ("golden_duty = 2.5e-1".into(), "f32")
@@ -175,7 +156,7 @@ fn duties_are_compared_as_shares_of_the_heads_range() {
             duty_error: Some(error),
             ..with_duties(&[0.5, 0.625, 0.75])
         };
-        assert_eq!(decisions(&actor(accepting), None).unwrap().kept(), kept, "{error}");
+        assert_eq!(decisions(&acting(accepting), None).unwrap().kept(), kept, "{error}");
     }
 }
 
@@ -183,11 +164,11 @@ fn duties_are_compared_as_shares_of_the_heads_range() {
 fn a_duty_that_is_not_known_is_that_of_the_known_output_or_of_the_network() {
     // outputs 0.5, 0.625 and 2, which the clip makes 0.75 of
     let outputs = golden(&[0.5, 0.5, 1.0], &[0.5, 0.625, 2.0], &[]);
-    let Decisions::Continuous(of_outputs) = decisions(&actor(outputs), None).unwrap() else {
+    let Decisions::Continuous(of_outputs) = decisions(&acting(outputs), None).unwrap() else {
         panic!("a head without actions")
     };
     assert_eq!((of_outputs.largest, of_outputs.worst.unwrap().row), (0.25, 1));
-    let Decisions::Continuous(own) = decisions(&actor(golden(&[0.5, 0.125], &[], &[])), None).unwrap() else {
+    let Decisions::Continuous(own) = decisions(&acting(golden(&[0.5, 0.125], &[], &[])), None).unwrap() else {
         panic!("a head without actions")
     };
     assert_eq!((own.largest, own.mean, own.observations), (0.0, 0.0, 2));

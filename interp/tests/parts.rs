@@ -5,12 +5,12 @@
 #[allow(dead_code)] // another file of tests has the rest
 mod common;
 
-use common::{Dense, PLAIN, load, threshold};
+use common::{Dense, PLAIN, load, threshold, vectors};
 use interp::Sample::{Code, Physical};
 use interp::golden::{golden_result, refusal};
 use interp::{Controller, status};
 use ndarray::aview1;
-use policy::{Golden, NumericFormat};
+use policy::{Golden, NumericFormat, Policy};
 
 const SOURCE: &str = "source = \"u\"";
 const FILTERED: &str = "source = \"u\"\nfilters = [\"backward_difference\"]";
@@ -139,17 +139,9 @@ fn answers_of_the_trainer_are_compared_row_by_row() {
     };
     let mut policy = load(&contract, &[], &[network]);
     let golden = Golden {
-        count: 3,
-        outside: 0,
-        observations: vec![3.0, 6.0, 4.0, 2.0, 1.0, 8.0],
         q_values: vec![3.0, 6.0, 4.0, 2.0, 1.0, 8.0],
         action_indices: vec![1, 0, 1],
-        duties: Vec::new(),
-        law: Vec::new(),
-        outputs: Vec::new(),
-        tolerance: 1e-4,
-        decisions: None,
-        duty_error: None,
+        ..vectors(3, &[3.0, 6.0, 4.0, 2.0, 1.0, 8.0])
     };
     policy.golden = Some(golden.clone());
     let result = golden_result(&policy).unwrap();
@@ -178,11 +170,10 @@ fn answers_of_the_trainer_are_compared_row_by_row() {
     assert!(refusal(&integer).is_some());
 }
 
-/// The trainer's network is one of tanh, and the contract says relu.
-#[test]
-fn an_activation_that_gives_every_golden_answer_is_the_hint() {
+/// One hidden unit with ReLU behind u from -40 to 40, then two Q values. `hidden` is its weight and its bias.
+fn deep(hidden: [f32; 2], weights: [f32; 2], bias: [f32; 2]) -> Policy {
     let contract = format!(
-        "name = \"deep\"\nsample_period = 0.25\n[[signal]]\nname = \"u\"\nrange = [-4.0, 4.0]\n[[feature]]\nname = \"x\"\nsource = \"u\"\n\
+        "name = \"deep\"\nsample_period = 0.25\n[[signal]]\nname = \"u\"\nrange = [-40.0, 40.0]\n[[feature]]\nname = \"x\"\nsource = \"u\"\n\
          [network]\nweights = \"weights.safetensors\"\nhidden_activation = \"relu\"\n[actions]\nduties = [0.25, 0.75]\n{PLAIN}"
     );
     let layer = |outputs, weights, bias| Dense {
@@ -191,25 +182,23 @@ fn an_activation_that_gives_every_golden_answer_is_the_hint() {
         weights,
         bias,
     };
-    let layers = [layer(1, &[1.0][..], &[0.5][..]), layer(2, &[2.0, -1.0], &[0.0, 0.25])];
-    let mut policy = load(&contract, &[], &layers);
-    let observations = vec![-2.0, -0.5, 0.75, 3.0];
+    let layers = [layer(1, &hidden[..1], &hidden[1..]), layer(2, &weights[..], &bias[..])];
+    load(&contract, &[], &layers)
+}
+
+/// The trainer's network is one of tanh, and the contract says relu.
+#[test]
+fn an_activation_that_gives_every_golden_answer_is_the_hint() {
+    let mut policy = deep([1.0, 0.5], [2.0, -1.0], [0.0, 0.25]);
+    let observations = [-2.0, -0.5, 0.75, 3.0];
     let q = observations.iter().flat_map(|x: &f32| {
         let y = (f64::from(*x) + 0.5).tanh();
         [2.0 * y, 0.25 - y]
     });
     policy.golden = Some(Golden {
-        count: 4,
-        outside: 0,
         q_values: q.map(|q| q as f32).collect(),
-        observations,
-        action_indices: Vec::new(),
-        duties: Vec::new(),
-        law: Vec::new(),
-        outputs: Vec::new(),
         tolerance: 1e-5,
-        decisions: None,
-        duty_error: None,
+        ..vectors(4, &observations)
     });
     let result = golden_result(&policy).unwrap();
     assert!(!result.passed());
@@ -229,35 +218,16 @@ fn an_activation_that_gives_every_golden_answer_is_the_hint() {
 /// Actions that are another than the most frequent one, here and there among them: from twenty on they tell an activation.
 #[test]
 fn few_actions_of_another_kind_tell_no_activation() {
-    let contract = format!(
-        "name = \"deep\"\nsample_period = 0.25\n[[signal]]\nname = \"u\"\nrange = [-40.0, 40.0]\n[[feature]]\nname = \"x\"\nsource = \"u\"\n\
-         [network]\nweights = \"weights.safetensors\"\nhidden_activation = \"relu\"\n[actions]\nduties = [0.25, 0.75]\n{PLAIN}"
-    );
-    let layer = |outputs, weights, bias| Dense {
-        inputs: 1,
-        outputs,
-        weights,
-        bias,
-    };
     // Q = (0.5, y): behind ReLU action 1 for x above 0.5 alone
-    let layers = [layer(1, &[1.0][..], &[0.0][..]), layer(2, &[0.0, 1.0], &[0.5, 0.0])];
-    let mut policy = load(&contract, &[], &layers);
+    let mut policy = deep([1.0, 0.0], [0.0, 1.0], [0.5, 0.0]);
     let with = |telling: usize| {
         let ones: Vec<usize> = (0..telling).map(|n| 2 * n).collect();
         let count = 2 * telling + 20;
-        let observations = (0..count).map(|n| if ones.contains(&n) { 0.4 } else { -1.0 }).collect();
+        let observations: Vec<f32> = (0..count).map(|n| if ones.contains(&n) { 0.4 } else { -1.0 }).collect();
         Golden {
-            count,
-            outside: 0,
-            observations,
-            q_values: Vec::new(),
             action_indices: (0..count).map(|n| u32::from(ones.contains(&n))).collect(),
-            duties: Vec::new(),
-            law: Vec::new(),
-            outputs: Vec::new(),
             tolerance: 1e-5,
-            decisions: None,
-            duty_error: None,
+            ..vectors(count, &observations)
         }
     };
     // sigmoid(0.4) is 0.6, above 0.5, and sigmoid(-1) 0.27 is not: with it all actions are given

@@ -4,26 +4,10 @@
 #[allow(dead_code)] // another file of tests has the rest
 mod common;
 
-use common::{Dense, PLAIN, load, threshold};
+use common::{Dense, PLAIN, actor, load, threshold, vectors};
 use interp::golden::{golden_result, refusal, unproven};
 use policy::{Golden, Policy};
 use toml_input::Faults;
-
-fn golden(observations: &[f32], count: usize) -> Golden {
-    Golden {
-        count,
-        outside: 0,
-        observations: observations.to_vec(),
-        q_values: Vec::new(),
-        action_indices: Vec::new(),
-        duties: Vec::new(),
-        law: Vec::new(),
-        outputs: Vec::new(),
-        tolerance: 1e-4,
-        decisions: None,
-        duty_error: None,
-    }
-}
 
 /// What is said of a policy with these answers.
 fn said(mut policy: Policy, golden: Golden) -> Option<String> {
@@ -46,7 +30,7 @@ fn chooser() -> Policy {
 fn of_actions_alone_their_number_is_told() {
     let answers = |actions: &[u32]| Golden {
         action_indices: actions.to_vec(),
-        ..golden(&[3.0, 6.0, 8.0, 2.0], 4)
+        ..vectors(4, &[3.0, 6.0, 8.0, 2.0])
     };
     assert_eq!(said(chooser(), answers(&[0, 1, 1, 0])), None);
     let told = said(chooser(), answers(&[0, 1, 0, 1])).unwrap();
@@ -68,7 +52,7 @@ fn changed_decisions_are_counted_beside_what_is_allowed() {
         action_indices: vec![0, 0, 1],
         tolerance: 0.06,
         decisions,
-        ..golden(&[3.0, 5.02, 8.0], 3)
+        ..vectors(3, &[3.0, 5.02, 8.0])
     };
     let told = said(chooser(), answers(None)).unwrap();
     holds(
@@ -84,28 +68,13 @@ fn changed_decisions_are_counted_beside_what_is_allowed() {
     assert_eq!(said(chooser(), answers(Some(0.34))), None);
 }
 
-/// y = x, clipped to 0.25 and 0.75: a range of half of the duty.
-fn actor() -> Policy {
-    let contract = format!(
-        "name = \"actor\"\nsample_period = 0.25\n[[signal]]\nname = \"u\"\nrange = [0.0, 1.0]\n[[feature]]\nname = \"x\"\n\
-         source = \"u\"\n[network]\nweights = \"weights.safetensors\"\n[actions]\ncontinuous = {{ clip = [0.25, 0.75] }}\n{PLAIN}"
-    );
-    let network = Dense {
-        inputs: 1,
-        outputs: 1,
-        weights: &[1.0],
-        bias: &[0.0],
-    };
-    load(&contract, &[], &[network])
-}
-
 #[test]
 fn duties_that_are_off_are_told_as_a_share_of_their_range() {
     let answers = |tolerance: f64, duty_error: Option<f64>| Golden {
         duties: vec![0.5, 0.625],
         tolerance,
         duty_error,
-        ..golden(&[0.5, 0.5], 2)
+        ..vectors(2, &[0.5, 0.5])
     };
     // another network: 0.125 of 0.5 is more than the tolerance
     let told = said(actor(), answers(1e-4, None)).unwrap();
@@ -150,7 +119,7 @@ fn gains_that_are_off_are_told_as_a_share_of_their_range() {
         q_values: vec![0.5, 0.25],
         tolerance,
         duty_error,
-        ..golden(&[1.0, 2.0], 2)
+        ..vectors(2, &[1.0, 2.0])
     };
     // a quarter of an output is an eighth of the range from -1 to 1
     let told = said(policy(), answers(1e-4, None)).unwrap();
@@ -180,7 +149,7 @@ fn a_duty_of_a_law_is_told_as_a_share_of_its_limits() {
         // the network says 0.5: 0.25 + 0.5 / 8 * 2 is 0.375, and 0.1875 more is a quarter of the limits
         duties: vec![0.375, 0.5625],
         law: vec![0.25, 2.0, 0.25, 2.0],
-        ..golden(&[2.0, 2.0], 2)
+        ..vectors(2, &[2.0, 2.0])
     };
     let result = interp::golden::judge(&answers, &policy.head, &[&[0.5], &[0.5]]);
     assert_eq!((result.worst_duty_error, result.limits_range), (Some(0.25), Some(0.75)));
@@ -196,7 +165,7 @@ fn a_hint_names_activations_alone_where_answers_tell_them_apart() {
     let mut policy = chooser();
     policy.golden = Some(Golden {
         q_values: vec![5.0, 4.0],
-        ..golden(&[3.0], 1)
+        ..vectors(1, &[3.0])
     });
     assert!(golden_result(&policy).unwrap().activations.is_empty());
 }

@@ -5,7 +5,7 @@
 #[allow(dead_code)] // another file of tests has the rest
 mod common;
 
-use common::{Dense, PLAIN, load};
+use common::{Dense, PLAIN, load, vectors};
 use interp::decisions::{Decisions, decisions};
 use interp::{Controller, Sample, Trace};
 use policy::{Golden, Policy};
@@ -147,17 +147,8 @@ fn gains_in_a_format_are_held_against_those_of_the_trainers_outputs() {
         "base = \"0.25\"\ngains = [{ source = \"u\", clip = [-1, 1], scale = 0.125 }, { clip = [-1, 1], scale = 0.5 }]";
     let mut policy = policy(&[0.5, 0.125], actions);
     policy.golden = Some(Golden {
-        count: 2,
-        outside: 0,
-        observations: vec![0.25, 1.0, -0.5, 2.0],
         q_values: vec![0.5, 0.125, 0.5, 0.375],
-        action_indices: Vec::new(),
-        duties: Vec::new(),
-        law: Vec::new(),
-        outputs: Vec::new(),
-        tolerance: 1e-4,
-        decisions: None,
-        duty_error: None,
+        ..vectors(2, &[0.25, 1.0, -0.5, 2.0])
     });
     let Some(Decisions::Schedule(found)) = decisions(&policy, None) else {
         panic!("no schedule");

@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::Path;
 
-use policy::Policy;
+use policy::{Golden, Policy};
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize_to_file};
 
@@ -106,3 +106,37 @@ initial_duty = 0.5
 duty = 0.0625
 hold = 2
 "#;
+
+/// So many golden vectors with these observations and no answer yet; the tolerance is that of a contract.
+#[allow(dead_code)] // each file of tests uses its part
+pub fn vectors(count: usize, observations: &[f32]) -> Golden {
+    Golden {
+        count,
+        outside: 0,
+        observations: observations.to_vec(),
+        q_values: Vec::new(),
+        action_indices: Vec::new(),
+        duties: Vec::new(),
+        law: Vec::new(),
+        outputs: Vec::new(),
+        tolerance: 1e-4,
+        decisions: None,
+        duty_error: None,
+    }
+}
+
+/// y = x, clipped to 0.25 and 0.75: the head spans half of the duty.
+#[allow(dead_code)] // each file of tests uses its part
+pub fn actor() -> Policy {
+    let contract = format!(
+        "name = \"actor\"\nsample_period = 0.25\n[[signal]]\nname = \"u\"\nrange = [0.0, 1.0]\n[[feature]]\nname = \"x\"\n\
+         source = \"u\"\n[network]\nweights = \"weights.safetensors\"\n[actions]\ncontinuous = {{ clip = [0.25, 0.75] }}\n{PLAIN}"
+    );
+    let network = Dense {
+        inputs: 1,
+        outputs: 1,
+        weights: &[1.0],
+        bias: &[0.0],
+    };
+    load(&contract, &[], &[network])
+}

@@ -76,6 +76,34 @@ fn the_observer_follows_losses_in_time_and_is_the_usual_one_without_them() {
     assert!(ideal.law().evaluated.met && !ideal.text.contains("faster than usual"));
 }
 
+/// Capacitors that a load step moves by a sixth of their voltage, and by a tenth; a diode, one period of delay.
+const SMALL: [(&str, Wanted); 2] = [
+    (
+        "[converter]\nv_in = 200.0\ninductance = 2e-3\ncapacitance = 150e-6\nf_sw = 10e3\n[pwm]\nduty_delay = 1\n",
+        Wanted {
+            v_ref: 100.0,
+            loads: [200.0, 1000.0],
+        },
+    ),
+    (
+        "[converter]\nv_in = 100.0\ninductance = 220e-6\ncapacitance = 1.4e-6\nf_sw = 300e3\n\
+         [load]\nv_fold = 16.75\n[pwm]\nduty_delay = 1\n",
+        Wanted {
+            v_ref: 67.0,
+            loads: [17.0, 67.0],
+        },
+    ),
+];
+
+#[test]
+fn the_law_of_a_small_capacitor_meets_the_specification() {
+    for (n, (plant, wanted)) in SMALL.into_iter().enumerate() {
+        let law = desk(&format!("small-{n}"), plant, wanted).law();
+        let missed: Vec<_> = law.verdicts().filter(|verdict| !verdict.holds()).collect();
+        assert!(law.evaluated.met, "{plant}{missed:?}");
+    }
+}
+
 /// From 12 V to 1.8 V, where networks of a short training meet the selection and exceed a limit of the evaluation by a third of a percent.
 const CORE: &str = "[converter]\nv_in = 12.0\ninductance = 2.3e-7\ncapacitance = 0.021\nf_sw = 170e3\nrectifier = \"synchronous\"\n\
                     [inductor]\ndcr = 0.00014\n[switch]\nr_ds_on = 0.00019\n[capacitor]\nesr = 2e-5\n[load]\nv_fold = 0.45\n[pwm]\nduty_delay = 1\n";

@@ -81,11 +81,11 @@ impl Start {
     /// If the loads are no range, or the plant is one for which there is no law or no limit ([`Design::new`],
     /// [`CurrentLaw::new`], [`Question::new`]).
     pub fn new(plant: &Parameters, file: &Path, wanted: Wanted) -> Result<Self, Error> {
-        Self::with_bias(plant, file, wanted, 1.0)?.tried(plant, file)
+        Self::with(plant, file, wanted, (1.0, None))?.tried(plant, file)
     }
 
-    /// With an observer whose bias may be wrong by so many times the usual in a period.
-    fn with_bias(plant: &Parameters, file: &Path, wanted: Wanted, bias: f64) -> Result<Self, Error> {
+    /// With an observer whose bias may be wrong by so many times the usual in a period, and a law with this pole or the usual one.
+    fn with(plant: &Parameters, file: &Path, wanted: Wanted, (bias, pole): (f64, Option<f64>)) -> Result<Self, Error> {
         let Wanted { v_ref, loads } = wanted;
         let [low, high] = loads;
         let range = LoadKind::Power.range();
@@ -105,7 +105,7 @@ impl Start {
             load: 1.2 * largest,
             noise,
             model: Some(model),
-            pole: None,
+            pole,
         };
         let topology = plant.converter.topology;
         match measures_inductor(plant) {

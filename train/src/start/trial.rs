@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use closed_loop::Converter;
-use plant::Parameters;
+use plant::{Parameters, Topology};
 
 use super::base::Base;
 use super::{Start, TRAINING};
@@ -21,23 +21,35 @@ const FACTORS: [f64; 5] = [2.0, 4.0, 8.0, 16.0, 32.0];
 /// Share of the cost that an observer which misses a limit as well may leave at most: a faster one has more noise at rest, and what it takes
 /// off a deviation that another limit forbids is not worth that.
 const WORTH: f64 = 0.5;
+/// Double pole of a buck's law that is tried where no observer does with the usual one.
+// after a load step down the diode blocks, and what the bias then believes has to be forgotten: the faster law of a buck with 150 uF
+// settles in 3.6 ms where the usual one takes 3.8, and asks for no faster observer. As the usual one it would exceed limits (POLE)
+const FASTER_POLE: f64 = 0.4;
 /// The contract, in a folder of its own.
 const CONTRACT: &str = "policy.toml";
 
 impl Start {
-    /// This one if its law meets the specification, else the first of [`FACTORS`] whose law does, else one whose law costs much less.
+    /// This one if its law meets the specification, else the first of [`FACTORS`] whose law does, of a buck at last the first with a
+    /// faster law that does, else one whose law costs much less.
     pub(super) fn tried(self, plant: &Parameters, file: &Path) -> Result<Self, Error> {
         if !matches!(self.base, Base::Observed(_)) {
             return Ok(self);
         }
         let mut best = (self.score(plant, file)?, self);
-        for factor in FACTORS {
+        let usual = FACTORS.map(|factor| (factor, None));
+        let is_buck = plant.converter.topology == Topology::Buck;
+        let faster = is_buck.then(|| {
+            std::iter::once(1.0)
+                .chain(FACTORS)
+                .map(|factor| (factor, Some(FASTER_POLE)))
+        });
+        for (factor, pole) in usual.into_iter().chain(faster.into_iter().flatten()) {
             if best.0.met {
                 break;
             }
-            let other = Self::with_bias(plant, file, best.1.wanted, factor)?;
+            let other = Self::with(plant, file, best.1.wanted, (factor, pole))?;
             let score = other.score(plant, file)?;
-            if score.met || score.cost < WORTH * best.0.cost {
+            if score.met || pole.is_none() && score.cost < WORTH * best.0.cost {
                 best = (score, other);
             }
         }

@@ -281,6 +281,27 @@ fn a_row_of_more_than_nine_layers_is_no_rival_of_one_that_fits() {
 }
 
 #[test]
+fn chains_of_a_file_end_in_a_choice_or_else_in_one_number() {
+    let shapes = |sizes: &[(usize, usize)]| {
+        let named = |(i, (inputs, outputs)): (usize, &(usize, usize))| (format!("net.{i}"), *inputs, *outputs);
+        policy::chains(&sizes.iter().enumerate().map(named).collect::<Vec<_>>())
+    };
+    assert_eq!(shapes(&[(2, 4), (4, 3)]), [[0, 1]]);
+    assert_eq!(shapes(&[(2, 4), (4, 1)]), [[0, 1]], "a continuous actor");
+    // two of the three make a chain, too; the whole is what is meant
+    assert_eq!(shapes(&[(2, 4), (4, 4), (4, 1)]), [[0, 1, 2]]);
+}
+
+#[test]
+fn of_networks_that_do_not_fit_the_longest_row_is_explained() {
+    // neither takes two inputs and ends in three actions; the row of three is told, not the one that comes first
+    let tensors = all(&[("alpha.0", 4, 5), ("beta.0", 4, 6), ("beta.2", 4, 4), ("beta.4", 3, 4)]);
+    let fault = Folder::new().tensors(&tensors).fault();
+    assert_says(&fault, &["beta.0"]);
+    assert!(!fault.to_string().contains("alpha.0"), "{fault}");
+}
+
+#[test]
 fn a_layer_wider_than_1024_is_refused() {
     let tensors = all(&[("net.0", 1025, 2), ("net.2", 3, 1025)]);
     assert_says(

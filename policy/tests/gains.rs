@@ -81,7 +81,7 @@ fn what_makes_no_gain_is_refused_at_its_place() {
         ),
         (
             "¦{ source = \"v_out\", feature = \"e\", clip = [-1, 1] }",
-            &["exactly one of `source`, `feature`"],
+            &["exactly one of `source`, `feature`", "2"],
         ),
         (
             "{ feature = ¦\"e_dle\", clip = [-1, 1] }",

@@ -51,6 +51,25 @@ fn golden_vectors_beside_the_weights_are_named() {
 }
 
 #[test]
+fn golden_vectors_are_named_in_the_folder_of_the_weights() {
+    for (weights, golden) in [
+        ("w.st", "golden.safetensors"),
+        ("a/w.st", "a/golden.safetensors"),
+        ("../nets/b/w.st", "../nets/b/golden.safetensors"),
+    ] {
+        let text = policy::draft(&policy::Draft {
+            weights: weights.to_owned(),
+            inputs: 1,
+            outputs: 2,
+            chains: vec!["l".to_owned()],
+            golden: true,
+            ..policy::Draft::default()
+        });
+        assert!(text.contains(&format!("\ngolden = \"{golden}\" ")), "{text}");
+    }
+}
+
+#[test]
 fn every_placeholder_of_a_new_contract_is_a_fault_by_name() {
     let folder = Folder::new();
     let text = scaffold(&folder.path().join("weights.safetensors")).unwrap();

@@ -87,6 +87,14 @@ fn a_percentage_is_recognised() {
 }
 
 #[test]
+fn duties_below_0_may_be_steps_of_a_duty() {
+    let hint = "write base = \"previous_duty\" and these numbers as `offsets`";
+    contract_fault("0.44, 0.50", "¦-0.01, 0.50", &["not a duty ratio", "-0.01", hint]);
+    let too_large = Folder::new().replace("0.44, 0.50", "1.5, 0.50").fault().to_string();
+    assert!(!too_large.contains("offsets"), "{too_large}");
+}
+
+#[test]
 fn numbers_that_are_not_finite_are_refused() {
     contract_fault("scale = 0.2", "scale = ¦nan", &["not a finite number", "nan"]);
     contract_fault("250.0", "¦inf", &["`range` is not a finite number", "inf"]);

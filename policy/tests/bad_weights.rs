@@ -318,6 +318,17 @@ fn files_of_other_kinds_get_a_hint_how_to_export() {
 }
 
 #[test]
+fn a_header_whose_length_begins_like_a_pickle_is_a_header() {
+    // 0x280 bytes, and the file ends with them: there are no tensors
+    let header = format!("{:<width$}", r#"{"__metadata__":{"a":"b"}}"#, width = 0x280);
+    let fault = Folder::new().file(FILE, &with_header(&header, &[])).fault().to_string();
+    assert!(!fault.contains("pickle"), "{fault}");
+    // one byte less than it says: then it is none
+    let cut = &with_header(&header, &[])[..0x280 + 7];
+    file_fault(cut, &["pickle"]);
+}
+
+#[test]
 fn malformed_files_say_what_is_wrong() {
     file_fault(b"", &["not a sound safetensors file", "0 bytes"]);
     file_fault(b"1234567", &["only 7 bytes"]);

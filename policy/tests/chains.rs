@@ -267,6 +267,18 @@ fn more_than_nine_layers_are_refused() {
 }
 
 #[test]
+fn nine_layers_are_read() {
+    let sizes = |i: usize| (if i == 8 { 3 } else { 4 }, if i == 0 { 2 } else { 4 });
+    let nine: Vec<_> = (0..9)
+        .flat_map(|i| dense(&format!("net.{i}"), sizes(i).0, sizes(i).1))
+        .collect();
+    assert_eq!(names(&nine).len(), 9);
+    // beside another network that fits nothing
+    let two: Vec<_> = nine.into_iter().chain(dense("other.0", 5, 7)).collect();
+    assert_eq!(names(&two).len(), 9);
+}
+
+#[test]
 fn a_row_of_more_than_nine_layers_is_no_rival_of_one_that_fits() {
     let sizes = |i: usize| (if i == 9 { 3 } else { 4 }, if i == 0 { 2 } else { 4 });
     let deep = (0..10).flat_map(|i| dense(&format!("deep.{i}"), sizes(i).0, sizes(i).1));

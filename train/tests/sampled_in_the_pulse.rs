@@ -102,8 +102,9 @@ fn a_law_that_knows_nothing_of_the_sampling_instant_takes_longer() {
         let [.., settling] = found(&design, &plant, &format!("unaware-{carrier:?}-{phase}"));
         let [.., aware] = found(&plant, &plant, &format!("aware-{carrier:?}-{phase}"));
         println!("unaware {carrier:?} {phase}: {settling}, aware {aware}");
+        // a duty that acts a period later than it believes has to be waited for, seen and made up for: one period each
         assert!(
-            settling > 1.3 * aware,
+            settling > aware + 3.0 / plant.converter.f_sw,
             "{carrier:?}, sampled at {phase}: {settling} s, and {aware} s with it"
         );
     }

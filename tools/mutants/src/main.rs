@@ -27,11 +27,12 @@ use results::Results;
 use run::{End, Switched};
 
 const USAGE: &str = "\
-usage: cargo xtask mutants --seed S [--sample N] [--within T] [--again [--with P]] [--table]
+usage: cargo xtask mutants --seed S [--sample N] [--within T] [--without P] ... [--again [--with P]] [--table]
 
   --seed S     which mutants are drawn
   --sample N   so many of each of interp, policy and codegen (50)
   --within T   only by tests that take T seconds at most: a first look, what they do not catch stays open
+  --without P  not by the tests that begin so, which are not measured either; what the others do not catch stays open
   --again      those that no test caught once more: a test may be new
   --with P     only by the tests that begin so, as `policy/` or `policy/chains: a_row`; what they do not catch stays as it was
   --table      only what is known, nothing is run
@@ -54,6 +55,7 @@ struct Options {
     within: Option<Duration>,
     again: bool,
     with: String,
+    without: Vec<String>,
     table: bool,
 }
 
@@ -95,6 +97,10 @@ fn parse(arguments: &[String]) -> Result<Options, String> {
             "--seed" => seed = Some(number(&mut words)?),
             "--sample" => options.sample = usize::try_from(number(&mut words)?).unwrap_or(usize::MAX),
             "--within" => options.within = Some(Duration::from_secs(number(&mut words)?)),
+            "--without" => {
+                let program = words.next().ok_or("`--without` takes the name of a program")?;
+                options.without.push(program.clone());
+            }
             "--again" => options.again = true,
             "--with" => options.with = words.next().ok_or("`--with` takes the name of a program")?.clone(),
             "--table" => options.table = true,
@@ -154,11 +160,14 @@ fn work(options: &Options, folders: &Folders) -> Result<String, String> {
     let (built, tests) = build(options, folders, &population, &mut results)?;
     let tests: Vec<Test> = tests
         .into_iter()
-        .filter(|test| test.label().starts_with(&options.with))
+        .filter(|test| {
+            let begins = |name: &String| test.label().starts_with(name);
+            begins(&options.with) && !options.without.iter().any(begins)
+        })
         .collect();
     let mut asked = measured(&tests, folders, built.len())?;
     asked.retain(|asked| options.within.is_none_or(|most| asked.seconds <= most));
-    let asks_all = options.with.is_empty() && options.within.is_none();
+    let asks_all = options.with.is_empty() && options.without.is_empty() && options.within.is_none();
     let sample = sample(&population, &results, options.sample);
     let names = draw::names(&population);
     // an equal one passes whatever it is asked, and costs more than a hundred others
@@ -318,6 +327,12 @@ mod tests {
         let options = parse(&words("--seed 7 --sample 20 --again")).unwrap();
         assert_eq!((options.seed, options.sample, options.again), (7, 20, true));
         let first_look = parse(&words("--seed 7 --within 3")).unwrap();
+        assert_eq!(
+            parse(&words("--seed 7 --without tests/cli --without tests/on_target"))
+                .unwrap()
+                .without,
+            ["tests/cli", "tests/on_target"]
+        );
         assert_eq!(
             (options.within, first_look.within),
             (None, Some(Duration::from_secs(3)))

@@ -185,3 +185,22 @@ fn answers_that_are_written_are_read_again() {
     };
     assert_eq!(written(&policy, &duties), [of(&duty), of(&obs)]);
 }
+
+#[test]
+fn answers_beside_a_model_are_those_of_its_shape() {
+    let obs = f32_tensor("obs", &[2, 2], &[1.0, 5.0, -2.0, -10.0]);
+    let q = f32_tensor("q", &[2, 3], &[0.0, 1.0, 0.5, 3.0, 1.0, 2.0]);
+    let bytes = encode(&[obs, q]);
+    let fits = |inputs, outputs| {
+        let name = toml_input::FileName::new("golden.safetensors".as_ref());
+        policy::golden_fits(&name, bytes.clone(), inputs, outputs, &[]).map_err(|faults| faults.to_string())
+    };
+    assert!(fits(2, 3).is_ok());
+    for (inputs, outputs) in [(3, 3), (2, 4)] {
+        let said = fits(inputs, outputs).unwrap_err();
+        assert!(
+            said.contains("not the answers of this network"),
+            "{inputs} {outputs}: {said}"
+        );
+    }
+}

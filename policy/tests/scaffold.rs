@@ -171,3 +171,25 @@ fn many_duties_are_broken_into_lines() {
     assert_eq!(rows, [12, 12, 6], "{duties}");
     assert!(!duties.starts_with(','), "{duties}");
 }
+
+#[test]
+fn a_clip_of_the_training_is_written_with_whose_it_is() {
+    let feature = |clip: Option<(f64, f64, String)>| policy::DraftFeature {
+        affine: Some((0.5, 0.0)),
+        clip,
+        ..policy::DraftFeature::default()
+    };
+    let text = policy::draft(&policy::Draft {
+        weights: "w.st".to_owned(),
+        inputs: 2,
+        outputs: 2,
+        chains: vec!["l".to_owned()],
+        features: vec![feature(Some((-4.0, 4.0, "the box".to_owned()))), feature(None)],
+        ..policy::Draft::default()
+    });
+    assert!(
+        text.contains("clip = [-4.0, 4.0] },   # network input 0; clip: the box\n"),
+        "{text}"
+    );
+    assert!(text.contains("# network input 1\n"), "{text}");
+}

@@ -27,8 +27,8 @@ fn main() -> Result<(), Error> {
     let contract = Contract::load(&settings.contract, &settings.hidden)?;
     let converter = Converter::load(&settings.plant, &settings.set)?;
     for seed in 0..runs {
-        let start = Instant::now();
         let mut trainer = Trainer::new(&settings, &contract, &converter, seed)?;
+        let start = Instant::now();
         let ended = trainer.run_until(last, &AtomicBool::new(false), |_| {})?;
         if is_whole {
             trainer.finish(ended)?;

@@ -76,7 +76,7 @@ fn the_observer_follows_losses_in_time_and_is_the_usual_one_without_them() {
     assert!(ideal.law().evaluated.met && !ideal.text.contains("faster than usual"));
 }
 
-/// Capacitors that a load step moves by a sixth of their voltage, and by a tenth; a diode, one period of delay.
+/// Small capacitors, a diode, one period of delay.
 const SMALL: [(&str, Wanted); 2] = [
     (
         "[converter]\nv_in = 200.0\ninductance = 2e-3\ncapacitance = 150e-6\nf_sw = 10e3\n[pwm]\nduty_delay = 1\n",

@@ -97,8 +97,8 @@ impl Start {
         match self.bias {
             1.0 => table,
             times => format!(
-                "# the bias follows faster than usual ({times} times the usual noise of the model), for the losses of the plant file move it with\n\
-                 # the load: so the law alone settles soonest\n{table}"
+                "# the bias follows faster than usual ({times} times the usual noise of the model): so the law alone settles\n\
+                 # soonest where losses move it with the load, or a diode that blocks leaves it wrong\n{table}"
             ),
         }
     }

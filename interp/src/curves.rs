@@ -95,3 +95,16 @@ pub(crate) fn hard_swish<T: Real>(x: T) -> T {
     let h = number::<T>(0.5) - limited(a * number(1.0 / 6.0), 0.5);
     relu(x) - a * h
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_magnitude_has_no_sign_and_a_nan_stays_one() {
+        for (x, expected) in [(-0.0_f32, 0.0_f32), (0.0, 0.0), (-2.5, 2.5), (2.5, 2.5)] {
+            assert_eq!(magnitude(x).to_bits(), expected.to_bits(), "{x}");
+        }
+        assert!(magnitude(f32::NAN).is_nan());
+    }
+}

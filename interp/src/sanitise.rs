@@ -167,6 +167,7 @@ mod tests {
     fn held_sample_after_reset_is_the_plausible_value_nearest_to_zero() {
         assert_eq!(signal(-1.0, 1.0, None).nearest_to_zero().to_bits(), 0);
         assert_eq!(signal(-1.0, -0.0, None).nearest_to_zero().to_bits(), 0);
+        assert_eq!(signal(-0.0, 1.0, None).nearest_to_zero().to_bits(), 0);
         assert_eq!(signal(0.1, 1.0, None).nearest_to_zero(), 0.1);
         assert_eq!(signal(-2.0, -0.1, None).nearest_to_zero(), -0.1);
     }

@@ -81,6 +81,9 @@ fn each_gain_has_its_own_squash_scale_offset_and_limits() {
         0.375
     );
     assert_eq!(gain("scale = 0.25, offset = 0.5, limits = [-3.0, 3.0]", 0.5), 0.625);
+    // 1 is a number as any other, for a scale and for an offset
+    assert_eq!(gain("clip = [-1, 1], scale = 1.0, offset = 1.0", -0.5), 0.5);
+    assert_eq!(gain("clip = [-1, 1], scale = 2.0, offset = 1.0", -0.25), 0.5);
     // without squash and clip the limits act on what scale and offset made
     assert_eq!(gain("scale = 0.5, offset = 0.25, limits = [0.5, 0.75]", 64.0), 0.75);
     let tanh = f64::from(gain("squash = \"tanh\", scale = 0.25, offset = 0.5", 0.75));

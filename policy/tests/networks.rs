@@ -31,6 +31,9 @@ fn no_observation_has_more_than_24_fractional_bits() {
 fn a_network_that_is_cut_keeps_its_inputs_and_its_outputs() {
     let policy = Folder::new().policy();
     assert_eq!(policy.widest_hidden(), 4);
+    let mut shallow = policy.clone();
+    shallow.layers.truncate(1);
+    assert_eq!(shallow.widest_hidden(), 0, "a last layer is not hidden");
     let cut = policy.cut_to(2).unwrap();
     let shapes: Vec<_> = cut.layers.iter().map(|layer| (layer.inputs, layer.outputs)).collect();
     assert_eq!(shapes, [(2, 2), (2, 3)]);
@@ -75,4 +78,43 @@ fn a_hidden_layer_is_left_out_where_there_are_two() {
         .collect();
     assert_eq!(shapes, [(2, 4), (4, 3)]);
     assert_eq!(shallow.layers[1].weights, [0.25; 12]);
+}
+
+/// A neuron whose bias is below 0 might be provably 0, would be left out, and the cost of the rest would be too low.
+#[test]
+fn hidden_neurons_of_a_network_that_is_cut_are_alive() {
+    let mut policy = Folder::new().policy();
+    policy.layers[0].bias = vec![-0.5, 0.0, 1e-4, 2.0];
+    policy.layers[1].bias = vec![-0.5, 0.0, 1e-4];
+    let cut = policy.cut_to(4).unwrap();
+    assert_eq!(cut.layers[0].bias, [0.5, 1e-3, 1e-3, 2.0]);
+    assert_eq!(cut.layers[1].bias, policy.layers[1].bias, "an output may be what it is");
+    assert_eq!((cut.layers[0].bounds.len(), cut.layers[1].bounds.len()), (4, 3));
+    // of the first neuron the range of its sum, with the new bias: a rectifier has nothing below 0
+    let weights = &policy.layers[0].weights;
+    let products = [(weights[0], -20.0, 20.0), (weights[1], -150.0, 100.0)];
+    let highest = products.map(|(w, low, high): (f32, f32, f32)| (w * low).max(w * high));
+    let expected = f64::from(highest[0] + highest[1] + 0.5);
+    let high = cut.layers[0].bounds[0].high;
+    assert!((high / expected - 1.0).abs() < 1e-5, "{high}");
+    assert_eq!(cut.layers[0].bounds[0].low, 0.0);
+    assert_ne!(cut.digests.weights, policy.digests.weights, "it is another network");
+    assert!(cut.golden.is_none());
+    // sums that may leave the format have no bounds, and such a network no cost
+    policy.layers[1].weights.fill(1e37);
+    assert_eq!(policy.cut_to(4), None);
+}
+
+#[test]
+fn another_activation_stands_behind_hidden_layers_alone() {
+    use policy::Activation::{Identity, Relu, Tanh};
+    let policy = Folder::new().policy();
+    let of = |policy: Option<policy::Policy>| -> Vec<_> {
+        let layers = policy.unwrap().layers;
+        layers.iter().map(|layer| layer.activation).collect()
+    };
+    assert_eq!(of(policy.activated_by(Tanh)), [Tanh, Identity]);
+    assert_eq!(of(policy.with_activations(&[Tanh])), [Tanh, Identity]);
+    assert_eq!(of(policy.with_activations(&[])), [Relu, Identity]);
+    assert_eq!(of(policy.with_activations(&[Identity, Tanh])), [Identity, Tanh]);
 }

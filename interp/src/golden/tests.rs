@@ -55,6 +55,18 @@ fn error_is_relative_to_the_largest_q_of_its_vector() {
 }
 
 #[test]
+fn one_vector_is_judged_by_all_its_q_values() {
+    let one = Golden {
+        count: 1,
+        q_values: vec![1.0, -4.0, 2.0],
+        action_indices: vec![2],
+        ..golden()
+    };
+    let result = judge_choices(&one, &[&[1.0, -4.0, 3.0]]);
+    assert_eq!((result.actions_equal, result.worst_relative_error), (1, Some(0.25)));
+}
+
+#[test]
 fn nan_and_missing_answers_do_not_pass() {
     assert!(!judged([f64::NAN, -4.0, 2.0, 3.0]).passed());
     assert!(!judge_choices(&golden(), &[&[1.0, -4.0]]).passed());

@@ -397,6 +397,9 @@ mod tests {
         assert_eq!(of(0.0, 250.0), "[0, 250]");
         assert_eq!(of(-0.05, 0.123_456_7), "[-0.05, 0.12346]");
         assert_eq!(of(1e-4, 2.5e7), "[1.0000e-4, 2.5000e7]");
+        // from one thousandth to less than ten millions
+        assert_eq!(of(1e-3, 9_999_999.0), "[0.001, 9999999]");
+        assert_eq!(of(-1e7, 9.9e-4), "[-1.0000e7, 9.9000e-4]");
     }
 
     #[test]

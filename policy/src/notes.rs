@@ -330,6 +330,47 @@ mod tests {
         assert_eq!(cut(0.3, 0.5), None);
         assert!(cut(0.3, 0.49).is_some_and(|note| note.ends_with(": 0.5")));
         assert!(cut(0.31, 0.5).is_some_and(|note| note.ends_with(": 0.3")));
+        // the ends of a command are rounded to binary32: so much is no cut, and twice as much is one
+        let rounding = f64::from(f32::EPSILON);
+        let beside = |by: f64| beyond_limits(&limits(0.25, 0.5), &[0.25 - by, 0.5 + by], None);
+        assert_eq!(beside(rounding), None);
+        assert!(beside(2.0 * rounding).is_some());
+        // of several that are cut off all are named, and with a mapping its own note says it
+        let both = "duties outside the limits are cut off: 0.3, 0.5";
+        assert_eq!(cut(0.4, 0.45).as_deref(), Some(both));
+        let mapping = mapping(interval(0.0, 1.0));
+        assert_eq!(beyond_limits(&limits(0.4, 0.45), &[0.3, 0.5], Some(&mapping)), None);
+    }
+
+    #[test]
+    fn a_mapped_duty_has_four_terms() {
+        let mut mapping = mapping(interval(0.0, 1.0));
+        mapping.coefficients = Coefficients {
+            a: 1.25,
+            b: 0.0625,
+            c: 0.03125,
+            r: Some(-0.125),
+        };
+        // 0.625 + 0.25 + 0.03125 - 0.25
+        assert_eq!(mapped(&mapping, 0.5, 4.0), 0.656_25);
+        mapping.coefficients.r = None;
+        assert_eq!(mapped(&mapping, 0.5, 4.0), 0.906_25);
+    }
+
+    #[test]
+    fn an_initial_duty_that_no_step_commands_is_told() {
+        let said = |initial_duty: f64| {
+            outside_at_first(&Limits {
+                duty: interval(0.25, 0.75),
+                slew: None,
+                soft_start: None,
+                initial_duty,
+            })
+        };
+        assert_eq!([0.0, 0.25, 0.5, 0.75].map(said), [None, None, None, None]);
+        let outside = "initial_duty 0.125 lies outside of the limits 0.25 to 0.75: no step ever commands it";
+        assert_eq!(said(0.125).as_deref(), Some(outside));
+        assert!(said(0.875).is_some());
     }
 
     #[test]

@@ -118,3 +118,18 @@ fn a_policy_without_a_mapping_is_accepted() {
         .policy();
     assert!(policy.mapping.is_none() && policy.digests.mapping.is_none());
 }
+
+/// Duties lie from 0 to 0.56 and the load from -1 to 40 A: 6e37 * 0.56 + 1e36 * 40 is 7.4e37, of at most 8.5e37; below it is
+/// -4e37.
+#[test]
+fn what_may_be_set_at_run_time_must_not_overflow_at_any_duty_and_load() {
+    let with = |a: &str, b: &str| {
+        let adjust = format!("a = [0.8, {a}]\nb = [-{b}, {b}]");
+        Folder::new().file("drm.toml", MAPPING.replace("a = [0.8, 1.25]", &adjust).as_bytes())
+    };
+    assert!(with("6e37", "1e36").load().is_ok());
+    for (a, b) in [("8.4e37", "1e36"), ("6e37", "2e36")] {
+        let fault = with(a, b).fault();
+        assert_whole_file(&fault, "drm.toml", &["the mapped duty"]);
+    }
+}

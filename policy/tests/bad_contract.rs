@@ -260,6 +260,15 @@ fn syntax_faults_are_collected_and_keep_name_and_signals() {
     assert_eq!(faults.skeleton.signals.len(), 2);
 }
 
+/// The name of a file may be what is broken: none is read, and none is missed.
+#[test]
+fn of_a_text_with_faults_of_syntax_no_other_file_is_read() {
+    let text = CONTRACT.replace("weights.safetensors", "missing.safetensors");
+    let faults = Folder::new().contract(&text.replace("hold = 3", "hold = = 3")).faults();
+    assert_eq!(faults.faults.list.len(), 1, "{faults}");
+    assert_eq!(faults.files.len(), 1, "{:?}", faults.files);
+}
+
 #[test]
 fn a_fault_is_shown_with_its_line_and_carets() {
     let fault = contract_fault("0.44, 0.50", "¦44, 0.50", &[]);

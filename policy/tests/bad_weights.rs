@@ -174,6 +174,14 @@ fn a_wrong_number_of_inputs_or_outputs_is_explained() {
     );
 }
 
+/// Two layers of one row are a row: one that stands alone before them is not what is explained.
+#[test]
+fn a_mismatch_in_the_longest_row_is_told() {
+    let tensors = [dense("alone.0", 7, 9), dense("net.0", 4, 2), dense("net.2", 3, 5)].concat();
+    let fault = weights_fault(&tensors);
+    assert_tensor(&fault, "weights.safetensors", "net.2.weight", &["[3, 5]", "[3, 4]"]);
+}
+
 #[test]
 fn a_convolution_is_refused() {
     let fault = weights_fault(&replaced(tensor("net.0.weight", &[4, 2, 1])));

@@ -204,3 +204,30 @@ fn answers_beside_a_model_are_those_of_its_shape() {
         );
     }
 }
+
+/// The row in the middle lies outside: what is left of each answer is that of the first and of the last one.
+#[test]
+fn a_row_that_is_left_out_takes_its_answers_along() {
+    let obs = f32_tensor("obs", &[3, 2], &[1.0, 5.0, 21.0, 0.0, -2.0, -10.0]);
+    let kept = [1.0, 5.0, -2.0, -10.0];
+    let outside = |folder: Folder| {
+        let folder = folder.replace("hidden_activation", "golden_outside = 0.5\nhidden_activation");
+        let golden = folder.policy().golden.unwrap();
+        assert_eq!(
+            (golden.count, golden.outside, &golden.observations[..]),
+            (2, 1, &kept[..])
+        );
+        golden
+    };
+    let q = [0.0, 1.0, 0.5, 3.0, 1.0, 2.0, 4.0, 5.0, 6.0];
+    let action = raw_tensor("action", Dtype::U8, &[3], vec![1, 0, 2]);
+    let golden = outside(Folder::new().golden(&[obs.clone(), f32_tensor("q", &[3, 3], &q), action]));
+    assert_eq!(golden.q_values, [0.0, 1.0, 0.5, 4.0, 5.0, 6.0]);
+    assert_eq!(golden.action_indices, [1, 2]);
+    let actor = Folder::new()
+        .replace("duties = [0.44, 0.50, 0.56]", "continuous = { clip = [0.41, 0.59] }")
+        .tensors(&[dense("net.0", 4, 2), dense("net.2", 1, 4)].concat());
+    let output = f32_tensor("output", &[3], &[0.25, 7.0, 0.5]);
+    let golden = outside(actor.golden(&[obs, output, f32_tensor("duty", &[3], &[0.41, 0.59, 0.5])]));
+    assert_eq!((golden.q_values, golden.duties), (vec![0.25, 0.5], vec![0.41, 0.5]));
+}

@@ -109,6 +109,32 @@ fn every_activation_gives_the_answers_of_the_interpreter_in_integers() {
     }
 }
 
+/// Inner loops load whole words of weights; sums may take the place of the observation where two layers or more have read it; an
+/// output of 25 bits is an integer at the exponent field 127 + 24 less its fractional bits.
+#[test]
+fn the_frame_of_an_integer_network_follows_from_its_layers_and_scales() {
+    for (name, shares) in [
+        ("linear", false),
+        ("tail_blocks", false),
+        ("paper", true),
+        ("activations", true),
+    ] {
+        for format in [NumericFormat::I16, NumericFormat::I8] {
+            let policy = case(name).with_format(format);
+            let scales = policy::scales::of(&policy).unwrap();
+            let exponent = scales.layers.last().unwrap().outputs[0];
+            let program = codegen::lower(&policy, target("host"), Language::C);
+            let code = program.network.integer().unwrap();
+            assert_eq!(
+                (code.shares, code.q_field),
+                (shares, 151 - exponent),
+                "{name} {format:?}"
+            );
+            assert_eq!(program.alignment(), Some(4), "{name} {format:?}");
+        }
+    }
+}
+
 /// A network that chooses nothing tells nothing: the answers of a row differ from those of another.
 #[test]
 fn answers_differ_from_row_to_row() {
@@ -117,4 +143,74 @@ fn answers_differ_from_row_to_row() {
     rows.sort_unstable();
     rows.dedup();
     assert_eq!(rows.len(), 16);
+}
+
+/// Neurons of the hidden layer of `tail_blocks` that no observation brings above 0, in columns of weights of this sign.
+fn with_dead(neurons: &[usize], weight: f32, bias: f32) -> Policy {
+    let mut policy = case("tail_blocks");
+    for neuron in neurons {
+        policy.layers[0].bias[*neuron] = -1e9;
+        for row in policy.layers[1].weights.chunks_exact_mut(33) {
+            row[*neuron] = weight;
+        }
+    }
+    policy.layers[1].bias[0] = bias;
+    policy
+}
+
+#[track_caller]
+fn assert_removed(policy: &Policy, removed: &[usize]) {
+    let found = codegen::manifest::sizes(policy, target("host")).removed_neurons;
+    assert_eq!(found, removed, "{:?}", policy.numeric_format);
+    for name in ["host", "cortex-m4f"] {
+        assert_equal(policy, target(name), &expected(policy));
+    }
+}
+
+/// 28 of 33 are a multiple of four. A zero that is added tells -0 from +0, and in a fused sum a product that vanished from +0.
+#[test]
+fn dead_neurons_are_left_out_where_their_zero_changes_nothing() {
+    let five = [0, 7, 11, 30, 32];
+    for format in [NumericFormat::F32, NumericFormat::I16, NumericFormat::I8] {
+        assert_removed(&with_dead(&five, 1.0, 0.5).with_format(format), &[5, 0]);
+        assert_removed(&with_dead(&five, 1.0, 0.0).with_format(format), &[5, 0]);
+    }
+    let no_one: &[usize] = &[];
+    assert_removed(&with_dead(&five, 1.0, -0.0), no_one);
+    assert_removed(&with_dead(&five, 1.0, -0.0).with_format(NumericFormat::I16), &[5, 0]);
+    for weight in [-1.0, -0.0] {
+        assert_removed(&with_dead(&five, weight, -0.0), &[5, 0]);
+        assert_removed(
+            &with_dead(&five, weight, -0.0).with_format(NumericFormat::F32Fma),
+            &[5, 0],
+        );
+    }
+    assert_removed(&with_dead(&five, 1.0, 0.5).with_format(NumericFormat::F32Fma), no_one);
+    assert_removed(&with_dead(&five, -1.0, 0.5).with_format(NumericFormat::F64), no_one);
+}
+
+/// Groups of four: 31 neurons cost what 32 do, and where all are dead four stay.
+#[test]
+fn no_more_neurons_are_left_out_than_make_whole_groups() {
+    assert_removed(&with_dead(&[4], 1.0, 0.5), &[1, 0]);
+    assert_removed(&with_dead(&[4, 9], 1.0, 0.5), &[1, 0]);
+    assert_removed(&with_dead(&[4, 9, 20, 21, 22, 23], 1.0, 0.5), &[5, 0]);
+    let all: Vec<usize> = (0..33).collect();
+    assert_removed(&with_dead(&all, 1.0, 0.5), &[29, 0]);
+}
+
+/// A layer behind one that lost outputs loses the inputs, and outputs of its own.
+#[test]
+fn dead_neurons_of_layers_one_behind_the_other_are_left_out_of_both() {
+    let mut policy =
+        policy::load(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/buck12/policy.toml")).unwrap();
+    policy.golden = None;
+    for (layer, neurons, bias) in [(0, [0, 5, 17, 63], -500.0), (1, [1, 2, 40, 41], -5000.0)] {
+        for neuron in neurons {
+            policy.layers[layer].bias[neuron] = bias;
+        }
+    }
+    for format in [NumericFormat::F32, NumericFormat::I16, NumericFormat::I8] {
+        assert_removed(&policy.clone().with_format(format), &[4, 4, 0]);
+    }
 }

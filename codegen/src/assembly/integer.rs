@@ -292,25 +292,4 @@ impl Kernel {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// As few turns as possible: eight sums and one behind them are written out, ten are taken in two turns.
-    #[test]
-    fn up_to_nine_sums_are_added_without_a_loop() {
-        let has_loop = |sums: usize| {
-            let kernel = Kernel {
-                is_quad: false,
-                groups: 8,
-                count: 1,
-                height: 4,
-                shift: 8,
-                store: Store::Rectified,
-                sums: Some(sums),
-            };
-            kernel.text(&str::to_owned).contains(&"4:".to_owned())
-        };
-        assert!((1..=9).all(|sums| !has_loop(sums)));
-        assert!((10..=64).all(has_loop));
-    }
-}
+mod tests;

@@ -119,3 +119,98 @@ impl RealKernel {
         lines
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(inputs: usize, height: usize, relu: bool) -> Vec<String> {
+        let kernel = RealKernel { inputs, height, relu };
+        kernel.text(&str::to_owned, &|list| format!("{{{list}}}"))
+    }
+
+    #[test]
+    fn outputs_of_a_rectifier_go_in_pairs_and_the_last_one_alone() {
+        let expected = [
+            "vldmia bias!, {s0-s2}",
+            "2:",
+            "vldmia input!, {s24-s25}",
+            "vldmia w!, {s16-s18}",
+            "vmul.f32 s16, s16, s24",
+            "vmul.f32 s17, s17, s24",
+            "vmul.f32 s18, s18, s24",
+            "vadd.f32 s0, s0, s16",
+            "vadd.f32 s1, s1, s17",
+            "vadd.f32 s2, s2, s18",
+            "vldmia w!, {s16-s18}",
+            "vmul.f32 s16, s16, s25",
+            "vmul.f32 s17, s17, s25",
+            "vmul.f32 s18, s18, s25",
+            "vadd.f32 s0, s0, s16",
+            "vadd.f32 s1, s1, s17",
+            "vadd.f32 s2, s2, s18",
+            "vmov low, high, s0, s1",
+            "bic low, low, low, asr #31",
+            "bic high, high, high, asr #31",
+            "strd low, high, [out], #8",
+            "vmov low, s2",
+            "bic low, low, low, asr #31",
+            "str low, [out], #4",
+        ];
+        assert_eq!(text(2, 3, true), expected);
+    }
+
+    /// Five inputs have no divisor of at most four: one at a time.
+    #[test]
+    fn one_output_without_a_rectifier_is_stored_as_it_is() {
+        let expected = [
+            "vldmia bias!, {s0}",
+            "2:",
+            "vldmia input!, {s24}",
+            "vldmia w!, {s16}",
+            "vmul.f32 s16, s16, s24",
+            "vadd.f32 s0, s0, s16",
+            "subs turns, turns, #1",
+            "bne 2b",
+            "vstmia out!, {s0}",
+        ];
+        assert_eq!(text(5, 1, false), expected);
+    }
+
+    #[test]
+    fn eight_weights_are_in_flight_and_up_to_four_inputs_are_written_out() {
+        let lines = text(8, 10, false);
+        let loads: Vec<&String> = lines.iter().filter(|line| line.starts_with("vldmia w")).collect();
+        assert_eq!(loads, ["vldmia w!, {s16-s23}", "vldmia w!, {s16-s17}"].repeat(4));
+        assert!(lines.contains(&"vldmia input!, {s24-s27}".to_owned()));
+        // each sum takes each of the four inputs of a turn once, the last sums those behind the eighth
+        let sums = |sum: usize| {
+            lines
+                .iter()
+                .filter(|line| line.starts_with(&format!("vadd.f32 s{sum}, s{sum}, ")))
+                .count()
+        };
+        assert_eq!((0..10).map(sums).collect::<Vec<_>>(), [4; 10]);
+        assert!(lines.contains(&"vadd.f32 s9, s9, s17".to_owned()));
+        assert!(lines.ends_with(&["bne 2b".to_owned(), "vstmia out!, {s0-s9}".to_owned()]));
+        let turns = |inputs| {
+            RealKernel {
+                inputs,
+                height: 4,
+                relu: true,
+            }
+            .turns()
+        };
+        assert_eq!(
+            [1, 2, 3, 4, 5, 6, 7, 8, 9, 10].map(turns),
+            [1, 1, 1, 1, 5, 2, 7, 2, 3, 5]
+        );
+    }
+
+    #[cfg(feature = "c")]
+    #[test]
+    fn the_sums_inputs_and_weights_are_all_that_is_overwritten() {
+        let registers: BTreeSet<String> = (0..28).map(|n| format!("s{n}")).collect();
+        assert_eq!(RealKernel::clobbered().into_iter().collect::<BTreeSet<_>>(), registers);
+    }
+}

@@ -110,3 +110,27 @@ impl Within {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In bits of binary32: 0.25, 0.5 and 2 are 0x3E80_0000, 0x3F00_0000 and 0x4000_0000.
+    #[test]
+    fn a_range_has_the_cheapest_form_that_holds_it() {
+        let of = |low, high| Within::of(Scalar::F32, (Literal::exact(low), Literal::exact(high)));
+        assert_eq!(of(-0.5, 0.5), Within::Magnitude { bound: 0x3F00_0000 });
+        let beyond = |negated| Within::Beyond {
+            low: 0x3E80_0000,
+            width: 0x0080_0000,
+            negated,
+        };
+        assert_eq!(of(0.25, 0.5), beyond(false));
+        assert_eq!(of(-0.5, -0.25), beyond(true));
+        let around = |low, high| Within::Around { low, high };
+        assert_eq!(of(-0.5, 2.0), around(0xBF00_0000, 0x4000_0000));
+        // an end that is 0 holds zeros of both signs
+        assert_eq!(of(0.0, 0.5), around(0x8000_0000, 0x3F00_0000));
+        assert_eq!(of(-2.0, 0.0), around(0xC000_0000, 0));
+    }
+}

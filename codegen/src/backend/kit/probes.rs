@@ -330,6 +330,20 @@ mod tests {
         assert!(literals(Scalar::F32).into_iter().any(|literal| twice(literal.single())));
     }
 
+    /// The smallest, one in between and the largest subnormal number, the ends of the normal ones, and numbers that no format has.
+    #[test]
+    fn literals_of_binary64_are_those_that_are_read_wrongly() {
+        let values = literals(Scalar::F64).map(|literal| literal.value());
+        let subnormal: Vec<f64> = values.iter().copied().filter(|x| x.is_subnormal()).collect();
+        assert_eq!(subnormal[0].to_bits(), 1);
+        assert!(subnormal[1].is_sign_negative() && subnormal.len() == 4);
+        assert_eq!(subnormal[2], f64::MIN_POSITIVE.next_down());
+        for x in [f64::MIN_POSITIVE, f64::MAX, 0.1, -0.3, f64::powi(2.0, 53)] {
+            assert!(values.contains(&x), "{x:e}");
+        }
+        assert!(values.iter().any(|x| x.to_bits() == (-0.0_f64).to_bits()));
+    }
+
     #[test]
     fn contraction_and_numbers_rounded_to_binary32_are_told_apart_in_binary64() {
         type Answer = fn(f64, f64, f64) -> f64;

@@ -295,7 +295,32 @@ pub(crate) fn expression(problem: &str) -> Message {
 
 #[cfg(test)]
 mod tests {
-    use super::tidy;
+    use super::{adc_saturates, tidy};
+    use crate::model::Interval;
+
+    /// Ends of either sign and below 1, as of a quantity per unit: half as wide again is still a matter of one code.
+    #[test]
+    fn a_range_far_beyond_its_converter_asks_for_the_gain() {
+        let hint = |end: f64, low: f64, high: f64| {
+            let message = adc_saturates("x", end, 0.125, Interval { low, high });
+            format!("{message:?}")
+        };
+        for (end, low, high) in [(0.5, -0.5, 1.0), (-0.5, -1.0, 0.5), (8.0, 0.0, 12.5)] {
+            let said = hint(end, low, high);
+            assert!(said.contains("ends far inside of the range"), "{said}");
+        }
+        for (end, low, high, last) in [
+            (0.5, -4.0, 0.75, "0.375"),
+            (-0.5, -0.75, 4.0, "-0.375"),
+            (8.0, 0.0, 12.0, "7.875"),
+        ] {
+            let said = hint(end, low, high);
+            assert!(
+                said.contains(&format!("let the range end at {last}, a code before")),
+                "{said}"
+            );
+        }
+    }
 
     #[test]
     fn the_noise_of_a_quotient_is_left_out_and_nothing_else() {

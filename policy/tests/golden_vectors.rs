@@ -231,3 +231,14 @@ fn a_row_that_is_left_out_takes_its_answers_along() {
     let golden = outside(actor.golden(&[obs, output, f32_tensor("duty", &[3], &[0.41, 0.59, 0.5])]));
     assert_eq!((golden.q_values, golden.duties), (vec![0.25, 0.5], vec![0.41, 0.5]));
 }
+
+#[test]
+fn the_tolerance_is_the_contracts_or_that_of_rounding() {
+    let obs = f32_tensor("obs", &[2, 2], &[1.0, 5.0, -2.0, -10.0]);
+    let q = f32_tensor("q", &[2, 3], &[0.0, 1.0, 0.5, 3.0, 1.0, 2.0]);
+    let own = Folder::new()
+        .golden(&[obs, q])
+        .replace("hidden_activation", "golden_tolerance = 0.03125\nhidden_activation");
+    assert_eq!(own.policy().golden_tolerance(), 0.03125);
+    assert_eq!(Folder::new().policy().golden_tolerance(), 1e-5);
+}

@@ -12,10 +12,13 @@
 //! All but `r` is exact; `r` is taken as a line over the step. The tangent is made anew where the voltage has gone far from `u`, or
 //! crossed the load's fold, below which constant power is a resistor and leaves nothing.
 
+mod pace;
+mod rows;
 mod step;
 #[cfg(test)]
 mod tests;
 
+use self::rows::{End, Ends, Row};
 use self::step::Step;
 use super::{Full, I_CPL, I_L, Path, SHOWN, States, V_LOAD, between, first, left, moved};
 use crate::lag;
@@ -34,24 +37,6 @@ const MOST: f64 = 1e6;
 /// How far the voltage may go from the tangent's, relative.
 // r is 4e-4 of the constant power's current there, and the line through it leaves a third of that where it rings
 const FARTHEST: f64 = 0.02;
-
-/// A number that is linear in the states.
-#[derive(Clone, Copy)]
-struct Row<const N: usize> {
-    of: [f64; N],
-    add: f64,
-}
-
-impl<const N: usize> Row<N> {
-    #[inline(always)]
-    fn at(&self, x: &[f64; N]) -> f64 {
-        let mut sum = self.add;
-        for (factor, x) in self.of.iter().zip(x) {
-            sum += factor * x;
-        }
-        sum
-    }
-}
 
 /// What constant power does: its current, and where that acts.
 #[derive(Clone, Copy)]
@@ -86,10 +71,15 @@ impl Tangent {
         if self.folded { 0.0 } else { self.fastest() }
     }
 
+    #[inline(always)]
+    fn leaves_nothing(&self) -> bool {
+        self.power == 0.0 || self.folded
+    }
+
     /// What the line leaves of the current.
     #[inline(always)]
     fn rest(&self, v: f64) -> f64 {
-        if self.power == 0.0 || self.folded {
+        if self.leaves_nothing() {
             return 0.0;
         }
         let q = (v - self.u) * self.per_u;
@@ -103,7 +93,7 @@ impl Tangent {
 
     #[inline(always)]
     fn is_far(&self, v: f64) -> bool {
-        self.power != 0.0 && !self.folded && (v - self.u).abs() > FARTHEST * self.u
+        !self.leaves_nothing() && (v - self.u).abs() > FARTHEST * self.u
     }
 }
 
@@ -121,14 +111,7 @@ struct Circuit<const N: usize> {
     v_in: Row<N>,
     /// What keeps the path.
     left: Row<N>,
-}
-
-/// What is asked at both ends of a step.
-#[derive(Clone, Copy)]
-struct End {
-    v_out: f64,
-    rises: f64,
-    left: f64,
+    ends: Ends<N>,
 }
 
 impl<const N: usize> Circuit<N> {
@@ -150,6 +133,7 @@ impl<const N: usize> Circuit<N> {
             i_out: row(zero.signals.i_out),
             v_in: row(zero.signals.v_in),
             left: row(left(&zero, path)),
+            ends: Ends::new([&none; 4]),
         };
         for n in 0..N {
             let mut unit = [0.0; N];
@@ -170,6 +154,7 @@ impl<const N: usize> Circuit<N> {
         circuit.a[V_LOAD][state] += factor * per_volt;
         circuit.rises = circuit.derivative(&circuit.v_out);
         circuit.bends = circuit.derivative(&circuit.rises);
+        circuit.ends = Ends::new([&circuit.v_out, &circuit.rises, &circuit.left, &circuit.i_l]);
         circuit
     }
 
@@ -195,15 +180,6 @@ impl<const N: usize> Circuit<N> {
             track.voltage(value.unwrap_or(after.v_out));
         }
         track.voltage(after.v_out);
-    }
-
-    #[inline(always)]
-    fn end(&self, x: &[f64; N]) -> End {
-        End {
-            v_out: self.v_out.at(x),
-            rises: self.rises.at(x),
-            left: self.left.at(x),
-        }
     }
 
     fn slopes(&self, x: &[f64; N], r: f64) -> [f64; N] {
@@ -315,10 +291,12 @@ impl Full {
             states,
             path,
             load,
-            track,
+            track: caller,
             span: (t, h),
             ..
         } = interval;
+        // in registers, not in the caller's memory
+        let mut track = *caller;
         let far = rate::of_load(&self.p, load);
         let has_lags = self.low_pass != [0.0; 4];
         let mut x = first::<N>(states);
@@ -326,16 +304,16 @@ impl Full {
         track.discontinuous |= path.open;
         loop {
             let circuit = Circuit::new(self, &x, path, load, t);
-            let asked = (self.rate.max(far) * FEWER).max(circuit.tangent.grows() / rate::OTHER_STEP);
+            let asked = self.steps(&circuit, &x, path, far, h - used);
             let mut count = ((h - used) * asked).ceil().clamp(1.0, MOST) as u64;
             let length = (h - used) / count as f64;
             let total = self.total + far * rate::OTHER_STEP + circuit.tangent.fastest();
             let step = Step::new(&circuit, length, total);
             let lags = has_lags.then(|| lag::of_sensors(length, &self.low_pass));
-            let mut before = circuit.end(&x);
+            let mut before = circuit.ends.at(&x);
             let mut r = circuit.tangent.rest(x[V_LOAD]);
             track.voltage(before.v_out);
-            track.current(circuit.i_l.at(&x));
+            track.current(before.i_l);
             while count > 0 {
                 let (start, r0) = (x, r);
                 r = step.take(&circuit.tangent, &mut x, r0);
@@ -343,7 +321,9 @@ impl Full {
                     // a line knows nothing of the resistor on the other side
                     states[..N].copy_from_slice(&start);
                     let algebra = |x: &[f64; N], t: f64| self.algebra(x, path, load, t);
-                    let cut = self.advance_first(states, path, load, (t + used, length), track, algebra);
+                    *caller = track;
+                    let cut = self.advance_first(states, path, load, (t + used, length), caller, algebra);
+                    track = *caller;
                     used += cut;
                     count -= 1;
                     if cut < length {
@@ -352,10 +332,10 @@ impl Full {
                     x = first::<N>(states);
                     break;
                 }
-                let after = circuit.end(&x);
+                let after = circuit.ends.at(&x);
                 if path.only != 0.0 && after.left <= 0.0 {
                     let (cut, mut there) = circuit.crossing(&start, [before.left, after.left], length, total);
-                    circuit.follow(track, [&start, &there], [before, circuit.end(&there)], cut);
+                    circuit.follow(&mut track, [&start, &there], [before, circuit.ends.at(&there)], cut);
                     if has_lags {
                         let lags = lag::of_sensors(cut, &self.low_pass);
                         circuit.show(&mut states[SHOWN..], &lags, [&start, &there], [r0; 2], cut);
@@ -364,13 +344,14 @@ impl Full {
                     there[I_L] = 0.0;
                     track.current(0.0);
                     states[..N].copy_from_slice(&there);
+                    *caller = track;
                     return (used + cut).min(h);
                 }
                 if let Some(lags) = &lags {
                     circuit.show(&mut states[SHOWN..], lags, [&start, &x], [r0, r], length);
                 }
-                circuit.follow(track, [&start, &x], [before, after], length);
-                track.current(circuit.i_l.at(&x));
+                circuit.follow(&mut track, [&start, &x], [before, after], length);
+                track.current(after.i_l);
                 before = after;
                 used += length;
                 count -= 1;
@@ -380,6 +361,7 @@ impl Full {
             }
             if count == 0 {
                 states[..N].copy_from_slice(&x);
+                *caller = track;
                 return h;
             }
         }

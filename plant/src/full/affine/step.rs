@@ -72,7 +72,7 @@ impl<const N: usize> Step<N> {
     #[inline(always)]
     pub fn take(&self, tangent: &Tangent, x: &mut [f64; N], r: f64) -> f64 {
         let mut next = apply(&self.keep, x);
-        let is_linear = tangent.power == 0.0 || tangent.folded;
+        let is_linear = tangent.leaves_nothing();
         let [start, end] = &self.rest;
         for (next, add) in next.iter_mut().zip(&self.add) {
             *next += add;
@@ -97,15 +97,17 @@ impl<const N: usize> Step<N> {
 }
 
 #[inline(always)]
-fn apply<const N: usize>(matrix: &Matrix<N>, x: &[f64; N]) -> [f64; N] {
-    let mut sum = [0.0; N];
-    for n in 0..N {
-        // in pairs: what waits for the sum before it costs most in a step
-        let mut pairs = [0.0; 2];
-        for k in 0..N {
-            pairs[k % 2] += matrix[k][n] * x[k];
+pub(super) fn apply<const N: usize>(matrix: &Matrix<N>, x: &[f64; N]) -> [f64; N] {
+    // in pairs: what waits for the sum before it costs most in a step; column by column, which are vectors
+    let mut pairs = [[0.0; N]; 2];
+    for (k, column) in matrix.iter().enumerate() {
+        for (sum, factor) in pairs[k % 2].iter_mut().zip(column) {
+            *sum += factor * x[k];
         }
-        sum[n] = pairs[0] + pairs[1];
+    }
+    let [mut sum, odd] = pairs;
+    for (sum, odd) in sum.iter_mut().zip(&odd) {
+        *sum += odd;
     }
     sum
 }

@@ -6,7 +6,7 @@
 //!         └───────────── what raised the bound comes first in the next look ◄──────────────┘
 //! ```
 //!
-//! A network that is not ruled out after some trials, and surely misses a limit, is put off (`waiting.rs`).
+//! A network that its first trials do not rule out, and that surely misses a limit, is put off (`waiting.rs`).
 //!
 //! Invariant: the bound only grows and ends as the cost, to the bit, whatever the order. So the order decides how long a look
 //! takes and how large the bound is that it ends with, and not which network is kept.
@@ -79,7 +79,7 @@ pub(crate) enum Seen {
     All,
     /// As many as rule it out.
     Enough,
-    /// A few, which did not rule it out.
+    /// A part of them, which did not rule it out.
     Some,
 }
 
@@ -154,7 +154,7 @@ pub(crate) struct Judging<'a, E, C> {
 
 impl<E: Environment, C: Control> Judging<'_, E, C> {
     /// Trials that show each load step once, where nothing is known of them.
-    pub fn few(&self) -> usize {
+    fn few(&self) -> usize {
         self.steps.len() * self.places.len()
     }
 

@@ -7,7 +7,8 @@
 //! ```
 //!
 //! While a training learns fast nearly every look finds a better network, and all trials of each cost more than the looks that find
-//! none. Most of them are beaten by one that waits beside them: only the best of those is run through all trials.
+//! none. Most of them are beaten by one that waits beside them, or is found later: only the best of those is run through all trials, and
+//! most of the others through one or two.
 //!
 //! Invariant: the network that is kept is the one of the lowest cost, of equal ones the earliest, as if none had waited; and a
 //! training ends at the same control period, since one that may meet the specification does not wait.
@@ -19,10 +20,14 @@ use crate::trials::Seen;
 use closed_loop::environment::Environment;
 
 /// Networks that may wait.
-// each is run through its first trials once more, and all are held against an older best: with 16, 32 and 64 the looks of
-// examples/train/paper12.toml took 922, 901 and 980 thousand control periods, those of the first 8,000 of wide-delay.toml 1,501,
-// 1,358 and 1,262
-const MOST: usize = 32;
+// whoever waits longer meets a better best one, which one trial tells from it; neighbours take many. With 32, 64, 128, 256 and 512 the
+// looks of examples/train/paper12.toml with seed 0 took 827, 722, 539, 396 and 608 thousand control periods; with 128, 256, 512 and
+// 1,024 those of wide-delay.toml with seed 1 took 3,602, 2,900, 2,687 and 2,739. Many more, and the best one that is known lags for seconds
+const MOST: usize = 256;
+/// Parameters of all of them, unless they are [`LEAST`].
+// a checkpoint holds them, and one is written every few seconds: 8 MB, as the replay takes
+const MOST_PARAMETERS: usize = 2_000_000;
+const LEAST: usize = 32;
 
 /// A network that waits.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,7 +53,8 @@ impl<E: Environment> Trainer<E> {
             // the first of all is the bar of the others
             let bar = self.best.as_ref().map_or(f64::INFINITY, |best| best.score.cost);
             let mut judging = self.judging(network)?;
-            let mut count = if bar.is_finite() { judging.few() } else { usize::MAX };
+            // one trial at a time: while it waits a better one may be found, against which fewer trials do
+            let count = if bar.is_finite() { 1 } else { usize::MAX };
             let seen = loop {
                 let seen = judging.advance(bar, count, &mut told)?;
                 // what may end the training does not wait
@@ -56,7 +62,6 @@ impl<E: Environment> Trainer<E> {
                 if seen != Seen::Some || !may_end {
                     break seen;
                 }
-                count = 1;
             };
             let score = judging.bound;
             drop(judging);
@@ -94,7 +99,9 @@ impl<E: Environment> Trainer<E> {
             best.is_some_and(|best| own.settings.early_stop && best.score.met && best.step == own.step)
         };
         // one that waits may cost less although it misses a limit by a little
-        if meets(self) || self.waiting.len() >= MOST {
+        let parameters = self.learner.online.parameters.len().max(1);
+        let most = (MOST_PARAMETERS / parameters).clamp(LEAST, MOST);
+        if meets(self) || self.waiting.len() >= most {
             self.settle()?;
         }
         self.met = meets(self);
@@ -108,8 +115,9 @@ impl<E: Environment> Trainer<E> {
         let mut told = std::mem::take(&mut self.told);
         let mut best = self.best.take();
         {
-            let looks = waiting.iter().map(|one| self.judging(&one.network));
-            let mut looks = looks.collect::<Result<Vec<_>, Error>>()?;
+            // of those who have begun: most of the others never do
+            let mut looks = Vec::new();
+            looks.resize_with(waiting.len(), || None);
             let mut is_open = vec![true; waiting.len()];
             loop {
                 let open = waiting.iter().enumerate().filter(|(n, _)| is_open[*n]);
@@ -119,13 +127,19 @@ impl<E: Environment> Trainer<E> {
                 };
                 let bar = one.bar(best.as_ref());
                 if one.bound >= bar {
-                    is_open[n] = false;
+                    (is_open[n], looks[n]) = (false, None);
                     continue;
                 }
-                let count = looks[n].few();
-                let seen = looks[n].advance(bar, count, &mut told)?;
-                let score = looks[n].bound;
+                let look = match &mut looks[n] {
+                    Some(look) => look,
+                    none => none.insert(self.judging(&one.network)?),
+                };
+                let seen = look.advance(bar, 1, &mut told)?;
+                let score = look.bound;
                 is_open[n] = seen == Seen::Some;
+                if !is_open[n] {
+                    looks[n] = None;
+                }
                 // not less than before: the first trials may be others than those that it was put off after
                 waiting[n].bound = score.cost.max(waiting[n].bound);
                 if seen == Seen::All {

@@ -154,6 +154,15 @@ fn searcher<'a>(
 fn needs_instants(search: &Searcher<'_>, singles: &[Fit]) -> Option<(Problem, State)> {
     let (problem, null) = (search.fitter.problem, search.fitter.null);
     let single = search.leading(singles);
+    if single.as_ref().is_some_and(|fit| search.is_at_bound(fit)) {
+        // a cause that ends where it may go no further is none, and imitates what instants do: they alone are as good if they leave nothing
+        let inflation = noise::inflation(problem, &null.residual);
+        let freed = instants::freed(problem, null, inflation);
+        let leaves_nothing = |(freed, inside): &(Problem, State)| structures(freed, null, inside, inflation).is_empty();
+        if let Some(found) = freed.filter(leaves_nothing) {
+            return Some(found);
+        }
+    }
     let at = single.as_ref().map_or(null, |fit| &fit.state);
     let inflation = noise::inflation(problem, &at.residual);
     if let Some(needed) = instants::freed(problem, at, inflation) {

@@ -113,7 +113,7 @@ pub fn diagnose_knowing(
     });
     let (mut state, mut empirical) = (state, None);
     // causes that leave only noise leave nothing to describe, whatever speaks against them: a term would imitate them
-    if !found.structure.is_empty() && !found.is_misread() && (!explained || set_aside.is_some()) {
+    if !found.structure.is_empty() && found.is_of_a_converter() && (!explained || set_aside.is_some()) {
         say(Progress::Stage("empirical term"));
         let problem = whole_problem.as_ref().unwrap_or(&found.problem);
         empirical = described(problem, heldout, &base, (&mut state.model, trim), &mut pair);
@@ -171,6 +171,8 @@ pub fn diagnose_knowing(
 fn put_aside(mut rest: aside::Rest, found: &mut Examined, pair: &mut Option<Pair>) -> Option<(aside::Part, Problem)> {
     if rest.found.named.is_empty() {
         found.odd.push(rest.part.alone(&found.problem));
+        // what stands for edges may be all that another cause does to the channels that are left
+        found.odd.extend(words::edges(&rest.found));
         return None;
     }
     rest.found.read_before(found);
@@ -425,6 +427,7 @@ fn notes(found: &Examined, pair: Option<&Pair>) -> Vec<String> {
     // with nothing else to say it is the answer itself
     notes.extend(words::edges(found).filter(|_| found.verdict != Verdict::Consistent || !found.lines.is_empty()));
     notes.extend(words::curves(found));
+    notes.extend(words::drawn_beside(found));
     notes.extend(words::pulsed(found).filter(|_| found.verdict != Verdict::Unexplained));
     notes.extend(resistors::note(attribution).filter(|_| found.verdict != Verdict::Unexplained));
     // of what was found: where the model as given is far off, so are the instants of load steps that fit it best

@@ -16,6 +16,20 @@ const AT_BOUND: f64 = 0.01;
 /// A lower bound of a size below this share of the upper one is where an effect ends to be one, not where it is cut off.
 const NO_EFFECT: f64 = 0.05;
 
+/// A shape of a curve whose interval reaches from the end of its range this far inside is not held by the records, and its end says nothing: as a ratio
+/// over a range of decades, and as a share of any other. Conventions, far more than the width of what is held.
+const INSIDE_RATIO: f64 = 1.5;
+const INSIDE_SHARE: f64 = 0.2;
+
+/// Whether an interval that touches an end of the range `low` to `high` reaches well into it.
+fn reaches_inside([low, high]: [f64; 2], [from, to]: [f64; 2]) -> bool {
+    let is_of_decades = low > 0.0 && high > 5.0 * low;
+    match is_of_decades {
+        true => to > INSIDE_RATIO * from,
+        false => to - from > INSIDE_SHARE * (high - low),
+    }
+}
+
 /// Whether `value` lies at an end of its range `low` to `high` where it is cut off; `is_size` if the parameter makes the effect and does
 /// not only shape it: at the lowest capacitance a source's resistance is as large as ever.
 fn is_cut_off([low, high]: [f64; 2], is_size: bool, value: f64) -> bool {
@@ -101,11 +115,14 @@ pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], st
         let end = if profile.value > 0.5 * (low + high) { high } else { low };
         let [found, end] = [profile.value, end].map(|value| si(value, unit(profile.unit)));
         let name = format!("{} of {}", profile.name, candidate.cause.id);
-        if at(profile.value) {
+        let is_size = place < candidate.sizes();
+        // a valley without an end: what only shapes the curve of a part may lie anywhere in it
+        let is_open = !is_size && candidate.is_curve() && reaches_inside([low, high], profile.interval);
+        if at(profile.value) && !is_open {
             list.push(Doubt::Bound(format!(
                 "{name} ends at the limit of what is tried, {found} of {end}: the cause is another"
             )));
-        } else if place < candidate.sizes() && profile.interval.into_iter().any(at) {
+        } else if is_size && profile.interval.into_iter().any(at) {
             list.push(Doubt::Open(format!(
                 "{name} is not held by the records: its interval reaches the limit of what is tried, {end}"
             )));
@@ -229,7 +246,7 @@ pub fn said(doubts: &[Doubt]) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{is_cut_off, is_loose};
+    use super::{is_cut_off, is_loose, reaches_inside};
 
     #[test]
     fn causes_of_which_most_could_be_others_are_loose() {
@@ -239,6 +256,12 @@ mod tests {
         for (causes, tied, alone) in [(1, 1, true), (2, 2, false), (2, 1, true), (3, 1, false), (3, 0, true)] {
             assert_eq!(is_loose((causes, tied), alone), None, "{causes} {tied} {alone}");
         }
+    }
+
+    #[test]
+    fn an_interval_reaches_inside_by_a_ratio_over_decades_and_by_a_share_otherwise() {
+        assert!(reaches_inside([1e-5, 1.0], [1e-5, 2e-5]) && !reaches_inside([1e-5, 1.0], [0.9, 1.0]));
+        assert!(reaches_inside([0.5, 1.5], [1.2, 1.5]) && !reaches_inside([0.5, 1.5], [1.4, 1.5]));
     }
 
     #[test]

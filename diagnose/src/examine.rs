@@ -19,6 +19,7 @@ use crate::rivals::{self, RivalValue};
 use crate::sampling;
 use crate::shape::{Structure, structures};
 use crate::sides;
+use crate::small;
 use crate::timing::{self, Timing};
 use crate::unsure_levels;
 use crate::work::Work;
@@ -105,7 +106,7 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
     }
     let named = named(&attribution, &profiles);
     let mut doubts = doubts::of(&problem, &attribution, &profiles, &structure);
-    if let Some(fault) = rows_ahead(&problem, &misread, &named) {
+    if let Some(fault) = rows_ahead(&problem, &attribution.null, &misread, &named) {
         return Examined::misread(problem, attribution.null, outliers, fault);
     }
     if !structure.is_empty() || doubts::forbids(&named, &doubts) {
@@ -134,8 +135,17 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
     }
 }
 
+/// Causes that move samples or duties in time.
+const TIMING: [&str; 4] = ["sampling_delay", "duty_delay", "sensor_delay", "sensor_low_pass"];
+
 /// The shift of the rows that a sampling instant which explains the records is nothing but.
-fn rows_ahead(problem: &Problem, misread: &[Misread], named: &[Named]) -> Option<String> {
+fn rows_ahead(problem: &Problem, null: &State, misread: &[Misread], named: &[Named]) -> Option<String> {
+    if named.len() > 1 && named.iter().any(|cause| TIMING.contains(&cause.id)) {
+        // one shift of whole rows does what several causes do, of which a wrong instant is one
+        if let Some(words) = preflight::all_shifted(problem, null, misread) {
+            return Some(words);
+        }
+    }
     // beside it a cause may have taken up what the last row lost
     let sampled = named.iter().find(|cause| cause.id == "sampling_delay")?;
     let late = sampled.parameters.get("delay")?;
@@ -172,6 +182,15 @@ impl Examined {
     #[must_use]
     pub fn is_misread(&self) -> bool {
         self.attribution.best.is_none() && self.doubts.iter().any(|doubt| matches!(doubt, Doubt::Bench(_)))
+    }
+
+    /// Whether nothing says that the records are read in a wrong way, or are none of such a converter: a term fitted to them would describe
+    /// that, and spoil the model.
+    #[must_use]
+    pub fn is_of_a_converter(&self) -> bool {
+        let is_of_none = |doubt: &Doubt| matches!(doubt, Doubt::Bench(_) | Doubt::Kind(_) | Doubt::Noise(_));
+        let is_disordered = |index| small::disorder(&self.problem, &self.attribution.null, index).is_some();
+        !self.doubts.iter().any(is_of_none) && !(0..self.problem.records.len()).any(is_disordered)
     }
 
     /// The verdict with lines that no cause makes: beside causes they are left, and without causes they are all that there is.
@@ -248,7 +267,11 @@ impl Examined {
         let pair = held(&self.problem, heldout, base, found, trim)?;
         // what is no more than the step of a converter has no values that could fail to hold
         if self.verdict == Verdict::Explained && !self.named.is_empty() {
-            let fails = pair.doubts(&self.problem, found);
+            let causes = self.attribution.best.iter().flat_map(|best| &best.causes);
+            let of_curve = causes
+                .into_iter()
+                .any(|cause| self.attribution.candidates[*cause].is_curve());
+            let fails = pair.doubts(&self.problem, found, of_curve);
             if !fails.is_empty() {
                 self.verdict = Verdict::Unexplained;
             }

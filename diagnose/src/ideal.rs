@@ -72,12 +72,7 @@ impl Ideal {
             return 0.0;
         }
         let slopes = [2.0 * self.half(duty) / lasts[0], -2.0 * self.half(duty) / lasts[1]];
-        let begins = match carrier {
-            Carrier::Trailing => 0.0,
-            Carrier::Leading => 1.0 - duty,
-            Carrier::Centre => 0.5 * (1.0 - duty),
-        };
-        let since = (phase - begins).rem_euclid(1.0) * t_sw;
+        let since = since_on((carrier, duty), phase) * t_sw;
         let fades = lasts.map(|time| libm::exp(-time / tau));
         let step = tau * (slopes[0] - slopes[1]) / (1.0 - fades[0] * fades[1]);
         let (slope, corner, since) = match since < lasts[0] {
@@ -85,6 +80,21 @@ impl Ideal {
             false => (slopes[1], -step * (1.0 - fades[0]), since - lasts[0]),
         };
         tau * slope - corner * libm::exp(-since / tau)
+    }
+
+    /// The inductor current at rest at the sampling instant `phase` of a period, whose mean is `mean`. Where it rests it begins at 0.
+    pub fn at_phase(&self, mean: f64, (carrier, duty): (Carrier, f64), phase: f64) -> f64 {
+        if duty <= 0.0 || duty >= 1.0 {
+            return mean;
+        }
+        let half = self.half(duty);
+        let since = since_on((carrier, duty), phase);
+        let above_low = match since < duty {
+            true => 2.0 * half * since / duty,
+            false => 2.0 * half * (1.0 - (since - duty) / (1.0 - duty)),
+        };
+        // the triangle of a current that rests is narrower and as steep
+        (mean - half).max(0.0) + above_low
     }
 
     /// Whether the inductor current surely never rests: a voltage then follows from the duty alone.
@@ -102,7 +112,49 @@ impl Ideal {
     }
 }
 
+/// Where in the period a phase lies, from the instant at which the switch turns on.
+fn since_on((carrier, duty): (Carrier, f64), phase: f64) -> f64 {
+    let begins = match carrier {
+        Carrier::Trailing => 0.0,
+        Carrier::Leading => 1.0 - duty,
+        Carrier::Centre => 0.5 * (1.0 - duty),
+    };
+    (phase - begins).rem_euclid(1.0)
+}
+
 /// What a load draws at a voltage, A.
 pub fn drawn(load: &Load, volts: f64) -> f64 {
     load.conductance * volts + load.current + if volts > 0.0 { load.power / volts } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 200 V, 2 mH and 10 kHz: at a duty of one half a ripple of 2.5 A to either side.
+    #[test]
+    fn the_current_at_an_instant_lies_on_the_triangle_and_begins_at_0_where_it_rests() {
+        let ideal = Ideal::at(&Parameters::paper_table(), 1.0);
+        let half = ideal.half(0.5);
+        for (carrier, off) in [
+            (Carrier::Trailing, 0.5),
+            (Carrier::Leading, 0.0),
+            (Carrier::Centre, 0.75),
+        ] {
+            let at = |mean: f64, phase: f64| ideal.at_phase(mean, (carrier, 0.5), phase);
+            for mean in [2.0 * half, 5.0 * half] {
+                assert!((at(mean, off) - mean - half).abs() < 1e-9, "{carrier:?}: the peak");
+                assert!(
+                    (at(mean, off + 0.25) - mean).abs() < 1e-9,
+                    "{carrier:?}: on the way down"
+                );
+                assert!(
+                    (at(mean, off + 0.5) - mean + half).abs() < 1e-9,
+                    "{carrier:?}: the valley"
+                );
+            }
+            assert!((at(0.1 * half, off + 0.5)).abs() < 1e-9 && at(0.1 * half, off) > 0.0);
+        }
+        assert_eq!(ideal.at_phase(3.0, (Carrier::Trailing, 1.0), 0.3), 3.0);
+    }
 }

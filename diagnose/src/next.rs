@@ -345,6 +345,7 @@ fn planned(problem: &Problem, plan: Plan) -> Planned {
         free_steps: Vec::new(),
         capture: None,
         unread: Vec::new(),
+        ends: [None; CHANNELS],
         repairs: Vec::new(),
     };
     Planned {

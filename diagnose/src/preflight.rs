@@ -56,6 +56,8 @@ enum Reading {
 pub struct Misread {
     /// What it looks like, and what mends it.
     pub words: String,
+    /// Place of the record.
+    record: usize,
     reading: Reading,
     /// Nothing but noise is left in this reading.
     is_clean: bool,
@@ -206,6 +208,20 @@ pub fn is_rows_ahead(problem: &Problem, misread: &[Misread], late: f64) -> bool 
     all && misread.iter().all(is_it)
 }
 
+/// The shift that mends all records: the same whole rows in each, and nothing but noise left. A record in which a shift hardly shows need not
+/// tell of it, but has to bear it.
+pub fn all_shifted(problem: &Problem, null: &State, misread: &[Misread]) -> Option<String> {
+    let first = misread.first()?;
+    let is_it = |one: &Misread| one.is_clean && one.reading == first.reading;
+    let bears_it = |index: usize| {
+        let record = &problem.records[index];
+        let is_told = misread.iter().any(|one| one.record == index);
+        is_told || mean_square(problem, null, (index, record), Some(first.reading)) < WRONG
+    };
+    let is_shift = matches!(first.reading, Reading::Shifted(_));
+    (is_shift && misread.iter().all(is_it) && (0..problem.records.len()).all(bears_it)).then(|| first.words.clone())
+}
+
 /// Rows of a record in which readings are compared first: more only cost time where these tell.
 // some twenty readings of a record of thousands of rows take seconds
 const ENOUGH: usize = 1500;
@@ -230,6 +246,9 @@ fn mean_square(problem: &Problem, null: &State, (index, record): (usize, &Record
     if let Some(Reading::Probe(n, times)) = reading {
         // the noise was seen through the same probe
         alone.sigma[n] /= times;
+    }
+    if let Some(Reading::Exchanged(a, b)) = reading {
+        alone.sigma.swap(a, b);
     }
     let model = reading.map_or_else(|| null.model.clone(), |reading| reading.model(&null.model));
     let state = State::settle(&alone, &model, &alone.first_starts(), None);
@@ -258,6 +277,7 @@ fn best_reading(problem: &Problem, null: &State, index: usize) -> Option<Misread
     }
     (left < LEFT * as_it_is).then(|| Misread {
         words: reading.words(whole, &null.model),
+        record: index,
         reading,
         is_clean: left < WRONG,
         is_no_cause,
@@ -269,7 +289,9 @@ fn tried(problem: &Problem, null: &State, index: usize) -> Vec<Reading> {
     let record = &problem.records[index];
     let has = |n: usize| record.measured[n].iter().any(|v| v.is_finite());
     let shifts = (-FARTHEST..=FARTHEST).filter(|by| *by != 0).map(Reading::Shifted);
-    let pairs = [(1, 2), (0, 3)].into_iter().filter(|(a, b)| has(*a) && has(*b));
+    let pairs = [(1, 2), (0, 3), (0, 1), (0, 2)]
+        .into_iter()
+        .filter(|(a, b)| has(*a) && has(*b));
     let in_time = shifts.chain(pairs.map(|(a, b)| Reading::Exchanged(a, b)));
     // points of a table have no neighbours in time
     let mut list: Vec<Reading> = in_time.filter(|_| !record.settled).collect();

@@ -252,8 +252,11 @@ impl Problem {
         let drawn = ideal.inductor(ideal::drawn(&record.load[row], v), duty);
         let i = near(1)
             .map(|shown| shown + self.behind_sensor(record, row, drawn))
-            .or_else(|| Some(ideal.inductor(near(2)?, duty)))
-            .unwrap_or(drawn);
+            .unwrap_or_else(|| {
+                let mean = near(2).map_or(drawn, |measured| ideal.inductor(measured, duty));
+                // at an edge a whole half of the ripple beside the mean: from a current that rests no step leads to one that does not
+                ideal.at_phase(mean, (self.base.plant.pwm.carrier, duty), record.phase)
+            });
         // without bound where no steady state is
         let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
         [finite(v.max(0.0)), finite(if record.settled { drawn } else { i }), 0.0]

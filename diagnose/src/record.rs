@@ -82,6 +82,8 @@ pub struct Record {
     pub capture: Option<Box<Capture>>,
     /// Columns of channels that the model predicts and that are not compared.
     pub unread: Vec<Unread>,
+    /// Where the range of a channel's instrument ends, if it was left.
+    pub ends: [Option<f64>; CHANNELS],
     /// What was repaired or left out, in plain words.
     pub repairs: Vec<String>,
 }
@@ -146,6 +148,7 @@ impl Record {
             free_steps: Vec::new(),
             capture: None,
             unread: raw.unread.clone(),
+            ends: [None; CHANNELS],
             repairs: raw.repairs.clone(),
         };
         let labels = QUANTITIES.map(|name| raw.label(name));
@@ -220,18 +223,29 @@ impl Record {
 
     /// What lies at the end of an instrument's range was larger.
     fn leave_out_clipped(&mut self, labels: &[String; CHANNELS]) {
-        for (n, values) in self.measured.iter_mut().enumerate().filter(|_| !self.settled) {
+        if self.settled {
+            return;
+        }
+        for (n, name) in labels.iter().enumerate() {
             let step = self.lattice[n].max(self.resolution[n]);
-            let Some((end, count)) = clipped::at(values, step) else {
-                continue;
-            };
-            let name = &labels[n];
+            if let Some((end, _)) = clipped::at(&self.measured[n], step) {
+                self.leave_out_end(n, name, end);
+            }
+        }
+    }
+
+    /// Leaves out the rows of a channel that lie at `end`, where the range of its instrument ends.
+    pub(crate) fn leave_out_end(&mut self, n: usize, name: &str, end: f64) {
+        let at_end = self.measured[n].iter_mut().filter(|v| **v == end);
+        let count = at_end.map(|v| *v = f64::NAN).count();
+        if count > 0 {
+            let rows = if count == 1 { "row" } else { "rows" };
             self.repairs.push(format!(
-                "{count} rows of {name} lie at {end}, as if cut off at the end of a range: left out. Was the range of the \
+                "{count} {rows} of {name} lie at {end}, as if cut off at the end of a range: left out. Was the range of the \
                  instrument too small?"
             ));
-            values.iter_mut().filter(|v| **v == end).for_each(|v| *v = f64::NAN);
         }
+        self.ends[n] = Some(end);
     }
 
     /// A channel that never moves is a setting or a dead sensor, not a measurement.

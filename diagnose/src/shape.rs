@@ -68,7 +68,8 @@ pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64
             // chi-square of n blocks has the variance 2 n; the bound, so that correlated noise hides no structure
             let scatter = (2.0 / left.blocks as f64).sqrt() * inflation.sqrt().min(1.5);
             // a coarse converter leaves patterns that are none of the plant's
-            let step = record.lattice[n].max(flicker::digit(&record.measured[n]));
+            let written = record.lattice[n].max(record.resolution[n]);
+            let step = written.max(flicker::digit(&record.measured[n]));
             let coarse = step > 1.5 * problem.sigma[n] && left.square.sqrt() * problem.sigma[n] < step;
             // a simulator that is off by ACCURACY leaves that share of what was there, in squares
             let slow = left.slow > 1.0 + SLOW.max(SIGMAS * scatter) + ACCURACY * ACCURACY * before.slow;
@@ -229,7 +230,8 @@ fn kicks(record: &Record, values: &[f64], excess: f64) -> Option<String> {
     (most > 0 && held > OF_KICKS * excess && 2 * unstepped > found.len()).then(|| {
         let places: Vec<String> = found.iter().take(3).map(|row| format!("{:.5} s", record.time[*row])).collect();
         format!(
-            "kicks in {} places, first around t = {}, where neither duty nor load steps: lost or doubled pulses, or bursts from outside",
+            "kicks in {} places, first around t = {}, where neither duty nor load steps: something acts there that is in no column, be it lost or doubled \
+             pulses, bursts from outside, or a load or a source that moves",
             found.len(),
             places.join(", ")
         )

@@ -14,6 +14,8 @@ use crate::shape::structures;
 /// its size.
 const TIE: f64 = 9.0;
 const TIE_SHARE: f64 = 0.005;
+/// And never more than this share of what the lesser of the two causes explains. A convention: half of its size.
+const OF_LEAST: f64 = 0.25;
 /// A pair is fitted if at first order it explains this share of what the best pair explains. A
 /// convention that trades time for ties that first order does not show.
 const LOOKS_AS_GOOD: f64 = 0.97;
@@ -211,8 +213,11 @@ pub fn other_pairs(problem: &Problem, attribution: &Attribution, say: Listener<'
     let settled = problem.records.iter().all(|record| record.settled);
     looks.truncate(if settled { MOST_SETTLED } else { MOST });
     let explained = attribution.null.chi2 - best.state.chi2;
-    // the share is of what is explained: what two simulators differ by grows with the effect
-    let worst = best.state.chi2 + (TIE * attribution.inflation).max(TIE_SHARE * explained);
+    // the share is of what is explained: what two simulators differ by grows with the effect. What leaves a good part of one of the two is no
+    // tie all the same
+    let least = attribution.evidence.iter().copied().fold(f64::INFINITY, f64::min);
+    let share = (TIE_SHARE * explained).min(OF_LEAST * least);
+    let worst = best.state.chi2 + (TIE * attribution.inflation).max(share);
     let mut fits = progress::map(say, "other pairs of causes", &looks, |(_, pair)| {
         let values: Vec<f64> = pair
             .iter()

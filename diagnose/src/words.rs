@@ -3,7 +3,7 @@
 use plant::Topology;
 
 use crate::causes::CURVES;
-use crate::doubts;
+use crate::doubts::{self, Doubt};
 use crate::examine::Examined;
 use crate::findings::{Aside, Named, Verdict};
 use crate::gain::Shift;
@@ -34,16 +34,20 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>, left:
         Verdict::Unexplained => {
             let left = match left.is_empty() {
                 true => String::new(),
-                false => format!("; left is {}", shapes(left)),
+                false => format!("; left is {}", worst_shapes(left)),
             };
             if found.fits_training_alone() {
                 let doubts = doubts::said(&found.doubts).join("; ");
                 return format!("What explains the training records does not hold in what was held out: {doubts}.");
             }
-            let doubts: String = (doubts::said(&found.doubts).iter())
-                .map(|doubt| format!("; {doubt}"))
-                .collect();
-            format!("None of the known causes explains the records{left}{doubts}.")
+            // a fault of the bench first: it is what the reader can mend
+            let (bench, others): (Vec<Doubt>, Vec<Doubt>) =
+                (found.doubts.iter().cloned()).partition(|doubt| matches!(doubt, Doubt::Bench(_)));
+            let said = |doubts: &[Doubt]| -> String {
+                doubts::said(doubts).iter().map(|doubt| format!("; {doubt}")).collect()
+            };
+            let (bench, others) = (said(&bench), said(&others));
+            format!("None of the known causes explains the records{bench}{left}{others}.")
         }
         Verdict::Consistent if !found.lines.is_empty() => {
             format!("The model explains the records but for {lines}. No cause of the list makes that.")
@@ -90,6 +94,30 @@ pub const MOST_OF_IT: f64 = 0.9;
 fn shapes(structure: &[Structure]) -> String {
     let shape = |s: &Structure| format!("{} of {}: {}", s.channel, s.record, s.shape);
     structure.iter().map(shape).collect::<Vec<_>>().join("; ")
+}
+
+/// What is left, each channel once: in the record in which most is.
+fn worst_shapes(structure: &[Structure]) -> String {
+    let mut channels: Vec<&str> = Vec::new();
+    for one in structure {
+        if !channels.contains(&one.channel) {
+            channels.push(one.channel);
+        }
+    }
+    let worst = |channel: &&str| {
+        let own = || structure.iter().filter(|one| one.channel == *channel);
+        let first = own().max_by(|a, b| a.mean_square.total_cmp(&b.mean_square))?;
+        let others = match own().count() - 1 {
+            0 => String::new(),
+            1 => " (one more record shows something)".to_owned(),
+            more => format!(" ({more} more records show something)"),
+        };
+        Some(format!(
+            "{} of {}: {}{others}",
+            first.channel, first.record, first.shape
+        ))
+    };
+    channels.iter().filter_map(worst).collect::<Vec<_>>().join("; ")
 }
 
 /// Causes with their values.
@@ -278,6 +306,21 @@ pub fn edges(found: &Examined) -> Option<String> {
              the bench are not those of the model, they are {less} by this. A voltage that is read off by as much would look the same: a \
              multimeter at the output tells"
         )
+    })
+}
+
+/// What both current sensors show alike may be a current.
+pub fn drawn_beside(found: &Examined) -> Option<String> {
+    let attribution = &found.attribution;
+    let causes = attribution.best.iter().flat_map(|best| &best.causes);
+    let of_both = |cause: &usize| {
+        let candidate = &attribution.candidates[*cause];
+        candidate.cause.id == "i_offset" && candidate.form.knobs[0].keys.len() == 2
+    };
+    (found.verdict != Verdict::Unexplained && causes.into_iter().any(of_both)).then(|| {
+        "an offset of both current sensors looks like a constant current that is drawn beside the load and stands in no column, a fan or a \
+         second board: with it the voltage sags as well, by as much as the same step of the load makes it"
+            .to_owned()
     })
 }
 

@@ -8,8 +8,8 @@ use crate::drive::Model;
 use crate::record::Record;
 
 /// Rows of a plain converter that a diagnosis simulates before it begins nothing more.
-// a core does about a million in a second (0.9 to 1.5, hopeless records of 600 rows and three channels), and 25 s are what a user waits
-const ROWS: u64 = 24_000_000;
+// a core does .6 to 1.5 million in a second (hopeless records of 400 and 600 rows), and 25 s are what a user waits
+const ROWS: u64 = 30_000_000;
 /// What a row costs with a load cable, in rows without.
 // 3.3 M rows a second with an ESR, .7 M behind it a cable of 50 kHz, .3 M one of 160 kHz (docs/results/plant.md)
 const CABLE: u64 = 10;
@@ -137,6 +137,6 @@ mod tests {
         assert_eq!(work.said(), None);
         assert!(!work.half_is_left());
         assert!(!work.goes_on());
-        assert!(shared.said().is_some_and(|said| said.contains("24 million")));
+        assert!(shared.said().is_some_and(|said| said.contains("30 million")));
     }
 }

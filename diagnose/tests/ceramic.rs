@@ -93,7 +93,11 @@ fn found(part: Ceramic, capacitance: f64, curve: &str, seed: u64) -> Diagnosis {
 fn is_of(found: &Diagnosis, part: Ceramic) {
     for v in [10.5, 12.0, 13.0] {
         let [is, told] = [part.at(v), found.extended.plant.capacitance_at(v)];
-        assert!((told / is - 1.0).abs() < 0.03, "{v} V: {told:e} for {is:e}");
+        assert!(
+            (told / is - 1.0).abs() < 0.03,
+            "{v} V: {told:e} for {is:e}; {}",
+            found.findings.sentence
+        );
     }
 }
 

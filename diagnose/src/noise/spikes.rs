@@ -32,7 +32,8 @@ pub fn outliers(problem: &Problem, residual: &[f64]) -> Vec<Outlier> {
                 // both: what leaps in the signal alone the model explains, what leaps in the residual alone it brings
                 let alone = leaps(&left, row) && (leaps(&raw, row) || leaps_off_curve(&raw, row));
                 let near_others = leaps_over(&left, &wild, row) && leaps_over(&raw, &wild_raw, row);
-                if alone || near_others || leaps_in_a_pair(&left, row) && leaps_in_a_pair(&raw, row) {
+                let beside_bend = leaps_beside_bend(&left, &raw, row);
+                if alone || near_others || beside_bend || leaps_in_a_pair(&left, row) && leaps_in_a_pair(&raw, row) {
                     found.push(Outlier {
                         record: index,
                         row,
@@ -135,13 +136,33 @@ fn leaps_off_curve(values: &[f64], row: usize) -> bool {
     let usual = known.iter().copied().fold(0.0, f64::max);
     // at a step one of the neighbours lies where the row lies
     let [before, after] = [row - 1, row + 1].map(|other| values[row] - values[other]);
-    // the curves of its neighbours go through a leap, and lie off by two thirds of it
-    let beside = [row - 1, row + 1].map(|other| off_curve(values, other).unwrap_or(0.0));
-    let is_single = |off: f64| {
-        before * after > 0.0 && before.abs().min(after.abs()) > 0.5 * off && beside.iter().all(|other| *other < off)
-    };
+    let is_single =
+        |off: f64| before * after > 0.0 && before.abs().min(after.abs()) > 0.5 * off && is_off_most(values, row, off);
     known.len() >= 3
         && off_curve(values, row).is_some_and(|off| off > 2.0 * FAR && off > OFF_CURVE * usual && is_single(off))
+}
+
+/// Whether a row lies `off` its curve by more than its neighbours do theirs: those go through a leap, and lie off by two thirds of it.
+fn is_off_most(values: &[f64], row: usize, off: f64) -> bool {
+    let beside = [row - 1, row + 1].map(|other| off_curve(values, other).unwrap_or(0.0));
+    beside.iter().all(|other| *other < off)
+}
+
+/// The model bends by less than this share of a leap that it does not bring. One that steps a row late bends by half of what it leaves.
+const BENDS: f64 = 0.25;
+
+/// Whether a row leaps where the duty or the load steps: there the signal bends as sharply as it leaps, and the model alone tells the two apart. What
+/// it shows is the signal without the residual.
+fn leaps_beside_bend(left: &[f64], raw: &[f64], row: usize) -> bool {
+    let [before, after] = [row - 1, row + 1].map(|other| raw[row] - raw[other]);
+    let shown: Vec<f64> = raw.iter().zip(left).map(|(raw, left)| raw - left).collect();
+    let is_single = |off: f64| {
+        before * after > 0.0
+            && before.abs().min(after.abs()) > 0.5 * off
+            && is_off_most(left, row, off)
+            && off_curve(&shown, row).is_some_and(|bend| bend < BENDS * off)
+    };
+    leaps(left, row) && off_curve(left, row).is_some_and(|off| off > 2.0 * FAR && is_single(off))
 }
 
 /// Outliers that one sentence lists; a reader looks at no more.
@@ -168,7 +189,7 @@ pub fn spikes(problem: &Problem, outliers: &[Outlier]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::super::tests::normal;
-    use super::{leaps_in_a_pair, leaps_off_curve, leaps_over, wild};
+    use super::{leaps_beside_bend, leaps_in_a_pair, leaps_off_curve, leaps_over, wild};
 
     #[test]
     fn a_spike_on_a_swing_is_seen_and_a_step_or_a_swing_is_none() {
@@ -188,6 +209,36 @@ mod tests {
         };
         assert_eq!(seen(&spiked), [93]);
         assert!(seen(&swing).is_empty() && seen(&step).is_empty());
+    }
+
+    #[test]
+    fn a_spike_where_the_signal_bends_is_seen_and_a_model_that_steps_a_row_late_brings_none() {
+        let mut state = 5;
+        // a current that turns at row 60, as where a duty steps
+        let shown: Vec<f64> = (0..120).map(|n: i32| -30.0 * f64::from((n - 60).abs())).collect();
+        let mut left: Vec<f64> = (0..120).map(|_| normal(&mut state)).collect();
+        left[61] += 110.0;
+        let seen = |left: &[f64], shown: &[f64]| {
+            let raw: Vec<f64> = shown.iter().zip(left).map(|(a, b)| a + b).collect();
+            (2..118)
+                .filter(|row| leaps_beside_bend(left, &raw, *row))
+                .collect::<Vec<usize>>()
+        };
+        assert_eq!(seen(&left, &shown), [61]);
+        // measured at 60, shown at 61
+        let step = |n: i32| if n < 61 { 0.0 } else { 200.0 };
+        let late: Vec<f64> = (0..120).map(step).collect();
+        let own: Vec<f64> = (0..120).map(|n| step(n + 1) - step(n) + normal(&mut state)).collect();
+        assert!(seen(&own, &late).is_empty());
+        // a model that kicks where the converter does not
+        let mut kicked = shown.clone();
+        kicked[61] += 110.0;
+        let own: Vec<f64> = shown
+            .iter()
+            .zip(&kicked)
+            .map(|(a, b)| a - b + normal(&mut state))
+            .collect();
+        assert!(seen(&own, &kicked).is_empty());
     }
 
     #[test]

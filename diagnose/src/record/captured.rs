@@ -101,6 +101,7 @@ impl Raw<'_> {
             free_steps: Vec::new(),
             capture: Some(Box::<Capture>::new(found.capture)),
             unread: self.unread.clone(),
+            ends: [None; CHANNELS],
             repairs,
         };
         self.doubts(&record, parameters).propagate()?;

@@ -1,6 +1,6 @@
 //! Signals whose size or sign says that they are not what their column is called, or not in its unit.
 
-use plant::{Parameters, Topology};
+use plant::{Load, Parameters, Topology};
 use toml_input::Message;
 
 use super::Record;
@@ -120,6 +120,25 @@ fn drawn(record: &Record, parameters: &Parameters) -> Option<f64> {
 fn is_continuous(record: &Record, parameters: &Parameters) -> bool {
     let d = median(record.duty.iter().copied());
     drawn(record, parameters).is_some_and(|drawn| Ideal::of(record, parameters).never_rests(drawn, d))
+}
+
+/// Share of the rows in which the inductor current may rest from which on most samples of it may be 0: a record whose duty and load move may
+/// be continuous at their medians and rest in half of its rows.
+const MAY_REST: f64 = 0.1;
+
+/// Whether the inductor current may rest in more than a few rows.
+fn may_rest(record: &Record, parameters: &Parameters) -> bool {
+    let ideal = Ideal::of(record, parameters);
+    let may = |(load, duty): &(&Load, &f64)| !ideal.never_rests(ideal::drawn(load, ideal.volts(**duty)), **duty);
+    let count = record.load.iter().zip(&record.duty).filter(may).count();
+    !record.settled && count as f64 > MAY_REST * record.rows() as f64
+}
+
+/// What one in twenty values of a signal exceeds in size.
+fn peak(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = values.iter().filter(|v| v.is_finite()).map(|v| v.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.get(sizes.len() * 19 / 20).copied().unwrap_or(0.0)
 }
 
 /// A duty that is that of the lower switch.
@@ -300,13 +319,32 @@ fn sized(record: &Record, parameters: &Parameters, labels: &[&str; CHANNELS]) ->
             }
         }
     }
-    // a current that rests is sampled as 0 or nearly: too small is no size there
-    let rests = !record.settled && !is_continuous(record, parameters);
-    let off = known
-        .iter()
-        .filter(|(_, size, found)| ratio(*found, *size) > OTHER_UNIT)
-        .filter(|(n, size, found)| !(*n == 1 && rests && found < size));
+    // where the current may rest it is sampled as 0 or nearly, in most rows perhaps: too small is no size there
+    let rests = may_rest(record, parameters);
+    let is_off = |(n, size, found): &&(usize, f64, f64)| {
+        match *n == 1 && found < size {
+            // where it does not rest its valleys may be small: the unit is that of its peaks
+            true => !rests && peak(&record.measured[1]) * OTHER_UNIT < *size,
+            false => ratio(*found, *size) > OTHER_UNIT,
+        }
+    };
+    let off = known.iter().filter(is_off);
+    let as_drawn =
+        |(n, _, found): &(usize, f64, f64)| *n == 1 && sizes[2].is_some_and(|drawn| ratio(*found, drawn) < NEAR);
+    let exchanged = known.iter().any(as_drawn);
     let message = |(n, size, found): &(usize, f64, f64)| {
+        // small in most rows and as large as the load in some: an inductor current that is sampled where it rests
+        let swings = peak(&record.measured[2]) * FAR > *size;
+        if *n == 2 && exchanged && found < size && swings {
+            let (inductor, load) = (labels[1], labels[2]);
+            return Message::new(format!("the columns {inductor} and {load} look exchanged"))
+                .found(format!(
+                    "{load} around {}, and {inductor} as steady as a load",
+                    shown(*found)
+                ))
+                .expected(format!("around {} A of load by the model", shown(*size)))
+                .hint("name them the right way in the header, or by a map: --map i_l=COLUMN,i_out=COLUMN");
+        }
         let (name, unit) = (labels[*n], CHANNEL_UNITS[*n]);
         Message::new(format!("{name} is not in {unit}, or not of this converter"))
             .found(format!("around {}", shown(*found)))

@@ -10,6 +10,7 @@ mod weigh;
 pub(crate) use starts::Known;
 
 use crate::causes::Search;
+use crate::doubts;
 use crate::fit::{FINE, Fit, Fitter, State};
 use crate::level::{ACCURACY, threshold};
 use crate::noise;
@@ -43,6 +44,14 @@ const LOOKED_AT: usize = 5;
 /// the time of the search, six fits beside the leader's five.
 const LEADERS: usize = 2;
 const LOOKED_AT_BY_LEADERS: usize = 3;
+
+/// Share of what a fit at its limits explains that one within them has to explain to be followed in its place. A convention: what is true
+/// explains about as much as what imitates it.
+const MOST_OF_FIRST: f64 = 0.7;
+
+/// Fits between two looks at the budget: two cores have work, and a fit with a cable takes seconds. A convention, whatever the cores: what is
+/// found must not hang on them.
+const AT_ONCE: usize = 2;
 
 /// Fits sets of causes.
 pub(crate) struct Searcher<'a> {
@@ -120,6 +129,27 @@ impl Searcher<'_> {
         fits.sort_by(|a, b| self.score(a).total_cmp(&self.score(b)));
     }
 
+    /// Brings to the front of sorted fits the best that does not end where it may go no further, if it explains most of what the first explains of
+    /// `before`: one that does is no explanation, however much it imitates, and what it is followed by imitates as well.
+    fn most_tenable_first(&self, fits: &mut [Fit], before: f64) {
+        let Some(most) = fits.first().map(|fit| before - fit.state.chi2) else {
+            return;
+        };
+        let is_tenable = |fit: &Fit| !self.is_at_bound(fit) && before - fit.state.chi2 > MOST_OF_FIRST * most;
+        if let Some(place) = fits.iter().position(is_tenable) {
+            fits[..=place].rotate_right(1);
+        }
+    }
+
+    /// Whether a cause of a set ends where it may go no further. The curve of a part may: of another law than the plant's it is the nearest.
+    pub(crate) fn is_at_bound(&self, fit: &Fit) -> bool {
+        let is_at = |cause: &usize| {
+            let candidate = &self.fitter.candidates[*cause];
+            !candidate.is_curve() && doubts::is_at_bound(candidate, &self.values_of(fit, &[*cause]))
+        };
+        fit.causes.iter().any(is_at)
+    }
+
     /// `set` and `cause`, fitted from where it begins best.
     fn added(&self, set: &Set<'_>, cause: usize, from: &State) -> Fit {
         let causes = [set.causes, &[cause]].concat();
@@ -141,6 +171,7 @@ impl Searcher<'_> {
         let mut leaders = singles.to_vec();
         leaders.retain(|fit| fit.values.len() <= most);
         self.sort(&mut leaders);
+        self.most_tenable_first(&mut leaders, null.chi2);
         let is_enough = |fit: &&Fit| {
             null.chi2 - fit.state.chi2 >= threshold(fit.values.len(), self.inflation(fit))
                 || self.stands_for_edges(null, fit)
@@ -174,6 +205,7 @@ impl Searcher<'_> {
             larger.extend(self.with_edges(&best));
             larger.retain(|fit| fit.values.len() <= most);
             self.sort(&mut larger);
+            self.most_tenable_first(&mut larger, best.state.chi2);
             // a diode takes a share of the duty, too: edges are named for what the trim does where nothing else is worth a cause
             let of_edges = || larger.iter().find(|fit| self.stands_for_edges(&best.state, fit));
             let first = larger.first().filter(|fit| self.is_worth(&best, fit));
@@ -194,7 +226,10 @@ impl Searcher<'_> {
 
     /// The single cause that explains most for its parameters, brought to its end; nothing if none is worth it.
     pub fn leading(&self, singles: &[Fit]) -> Option<Fit> {
-        let first = singles.iter().min_by(|a, b| self.score(a).total_cmp(&self.score(b)))?;
+        let mut order = singles.to_vec();
+        self.sort(&mut order);
+        self.most_tenable_first(&mut order, self.fitter.null.chi2);
+        let first = order.first()?;
         let gain = self.fitter.null.chi2 - first.state.chi2;
         (gain >= threshold(first.values.len(), self.inflation(first))).then(|| self.polished(first))
     }
@@ -247,9 +282,16 @@ impl Searcher<'_> {
         // a nonlinear fit may gain three times what it promises at first order; less is not worth a fit
         let least = 0.3 * threshold(1, 1.0);
         let looks = looks.into_iter().filter(|(gain, _)| *gain > least).collect();
-        progress::map(self.say, stage, &top(looks, count), |cause| {
-            self.added(&set, *cause, &best.state)
-        })
+        let mut fits = Vec::new();
+        for (done, some) in top(looks, count).chunks(AT_ONCE).enumerate() {
+            if done > 0 && !self.fitter.problem.work.goes_on() {
+                break;
+            }
+            fits.extend(progress::map(self.say, stage, some, |cause| {
+                self.added(&set, *cause, &best.state)
+            }));
+        }
+        fits
     }
 
     fn sensitivities(&self, causes: &[usize], state: &State) -> Vec<Vec<f64>> {
@@ -310,6 +352,12 @@ impl Searcher<'_> {
         })
     }
 
+    /// Whether one of the causes of a set does nothing where it ends: the set is the smaller one without it.
+    fn has_nothing(&self, fit: &Fit) -> bool {
+        let is_nothing = |cause: &usize| self.fitter.candidates[*cause].is_nothing(&self.values_of(fit, &[*cause]));
+        fit.causes.iter().any(is_nothing)
+    }
+
     fn values_of(&self, fit: &Fit, kept: &[usize]) -> Vec<f64> {
         let places = self.fitter.places(&fit.causes);
         let of = |(place, value): (&(usize, usize), &f64)| kept.contains(&place.0).then_some(*value);
@@ -367,7 +415,10 @@ impl Searcher<'_> {
                     let other = fit.causes.last().is_some_and(|cause| !self.same(*cause, *own));
                     // the trim takes over what such a cause leaves, and is more than it may
                     let is_left_to_edges = self.asks_for_edges(&fit.state) && !self.asks_for_edges(&best.state);
-                    other && !is_left_to_edges && fit.state.chi2 <= best.state.chi2 + tolerance
+                    other
+                        && !is_left_to_edges
+                        && !self.has_nothing(fit)
+                        && fit.state.chi2 <= best.state.chi2 + tolerance
                 };
                 let near = |fit: &Fit| fit.state.chi2 <= best.state.chi2 + NEAR * tolerance;
                 let all: Vec<Fit> = all.into_iter().filter(near).collect();

@@ -37,7 +37,8 @@ pub(super) fn words(
         )
     } else {
         format!(
-            "a trembling {about}, without steps before it: edges that jitter or pulses that are lost kick it at random"
+            "a trembling {about}, without steps before it: something acts on the converter that is in no column, be it edges that jitter, lost \
+             pulses, or a load or a source that moves"
         )
     })
 }

@@ -139,6 +139,14 @@ fn a_processor_without_bytes_takes_neither_bytes_nor_binary64() {
 }
 
 #[test]
+fn code_for_a_processor_without_bytes_stops_where_an_int_has_other_bits() {
+    let files = codegen::sources(&case("minimal"), target("c2000-c28x"), &[Output::C], None).unwrap();
+    let text: String = files.files.into_values().collect();
+    // the largest of 16 bits in two's complement
+    assert!(text.contains("(INT_MAX == 32767)"), "{text}");
+}
+
+#[test]
 fn a_subnormal_constant_is_refused_where_the_processor_takes_it_for_0() {
     let with = |change: fn(&mut Policy)| {
         let mut policy = case("minimal");

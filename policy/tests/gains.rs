@@ -121,6 +121,13 @@ fn a_law_that_could_overflow_is_named_with_the_gain() {
         gains,
         &["the sum of the law up to gain 1", "could leave the range of f32"],
     );
+    // each within the range alone, and not together
+    let one = "{ source = \"1e30 * v_out\", clip = [-2.4e5, 2.4e5] }";
+    let last = "{ clip = [-1, 1] }";
+    fault(
+        &format!("gains = ¦[{one}, {one}, {last}]"),
+        &["the sum of the law up to gain 1", "could leave the range of f32"],
+    );
     // an output within +-10 or so, times 8e37
     let gains = "gains = ¦[{ limits = [-1, 1], scale = 8e37 }, { clip = [-1, 1] }, { clip = [-1, 1] }]";
     let folder = with(&gains.replace('¦', ""));

@@ -8,7 +8,8 @@ use crate::drive::Model;
 use crate::record::Record;
 
 /// Rows of a plain converter that a diagnosis simulates before it begins nothing more.
-// a core does .6 to 1.5 million in a second (hopeless records of 400 and 600 rows), and 25 s are what a user waits
+// a ceramic of another law than the plant's is found behind 24 million and before 30 (tests/ceramic.rs). A core does .6 to 1.5 million in a second
+// (hopeless records of 400 and 600 rows), so that the longest search is more than the 25 s that a user should wait
 const ROWS: u64 = 30_000_000;
 /// What a row costs with a load cable, in rows without.
 // 3.3 M rows a second with an ESR, .7 M behind it a cable of 50 kHz, .3 M one of 160 kHz (docs/results/plant.md)

@@ -149,6 +149,10 @@ const LEFT_BY_CHANCE: f64 = 64.0;
 /// above the noise. A few levels one of so many counters rounds nearly as one likes: of any offsets at L levels the best of M directions leaves
 /// the share M^(-2/(L-1)) in squares, a hundredth for five levels and an eighth for ten.
 fn are_told(problem: &Problem, excess: f64) -> bool {
+    // settled points are one for each level, and their candidates are told by the size of what they leave (`small`)
+    if problem.records.iter().all(|record| record.settled) {
+        return true;
+    }
     let levels = levels(problem).len() as f64;
     levels > 1.0 && excess * libm::pow(COUNTERS, -2.0 / (levels - 1.0)) > LEFT_BY_CHANCE
 }

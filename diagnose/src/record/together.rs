@@ -97,7 +97,7 @@ mod tests {
             let v = if cut.contains(&n) {
                 101.0
             } else {
-                96.0 + 4.9 * (n as f64 * 0.4).sin() + 0.13 * (n * 7 % 5) as f64
+                96.0 + 4.4 * (n as f64 * 0.4).sin() + 0.13 * (n * 7 % 5) as f64
             };
             let _ = writeln!(text, "{:.6},0.5,{:.3},20", (n as f64 + 0.5) * 1e-4, v.min(101.0));
         }

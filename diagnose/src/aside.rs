@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! in    records whose best causes leave structure
-//! look  which channel or record holds most of what is left; the whole search again without it
+//! look  without which channel or record least is left; the whole search again without it
 //! out   causes that leave no structure in the rest, or nothing
 //! ```
 //!
@@ -16,10 +16,12 @@ use crate::doubts::Doubt;
 use crate::drive::Model;
 use crate::examine::{Examined, examined};
 use crate::findings::{Aside, Verdict};
-use crate::fit::State;
+use crate::fit::{Fit, Fitter, ROUGH, State};
 use crate::gain::{self, Pair};
+use crate::instants;
 use crate::level::threshold;
 use crate::noise;
+use crate::parallel;
 use crate::problem::{Problem, dot};
 use crate::progress::{Listener, Progress};
 use crate::record::{CHANNEL_NAMES, CHANNELS, LOAD_CURRENT, Record};
@@ -29,8 +31,11 @@ use crate::worth;
 /// Looks without a part: each is a whole search. The causes bend to what no cause explains, so that the part that is left worst is not
 /// always the one that is disturbed, but one of two.
 const LOOKS: usize = 2;
-/// A part that is set aside holds at least this share of what is left: less would not be "all but one". A convention.
+/// Without a part that is set aside at least this share of what is left is gone: less would not be "all but one". A convention.
 const MAIN_PART: f64 = 0.25;
+/// Single causes that are fitted without a part, to see how much of the rest one of them explains. As many as are fitted after a linear look in
+/// the search: a convention.
+const LEADERS: usize = 5;
 /// Fewest rows of a record: settled points and short tables have more causes than places for structure.
 // five blocks of ten, from which on `shape` sees slow structure
 const FEWEST_ROWS: usize = 50;
@@ -176,41 +181,77 @@ fn spoilt_later(whole: &Examined) -> Option<Part> {
     (channels.all(|other| other == first) && may_miss(&whole.problem, first)).then_some(Part::Channel(first))
 }
 
-/// Parts that may be set aside, the one that holds most of what is left first.
+/// Parts that may be set aside, the one without which least is left first: by a single cause that is fitted to the rest alone, since what
+/// disturbs a channel bends the causes that are fitted to all, and the others show it.
 fn parts(whole: &Examined) -> Vec<Part> {
     let (problem, state) = (&whole.problem, whole.attribution.state());
-    let above = |record: usize, channel: usize| {
+    let channels = (0..CHANNELS).filter(|n| may_miss(problem, *n)).map(Part::Channel);
+    let runs = (0..problem.records.len())
+        .filter(|_| problem.records.len() > FEWEST_RECORDS)
+        .map(Part::Record);
+    let has_structure = |part: &Part| {
+        whole.structure.iter().any(|one| match part {
+            Part::Channel(n) => one.channel == CHANNEL_NAMES[*n],
+            Part::Record(index) => one.record == problem.records[*index].name,
+        })
+    };
+    let total = above(problem, state, |_, _| true);
+    let left = |part: Part| {
+        let as_fitted = above(problem, state, |record, channel| !part.holds(record, channel));
+        match part {
+            Part::Channel(n) => as_fitted.min(left_by_one_cause(whole, n)),
+            Part::Record(_) => as_fitted,
+        }
+    };
+    let parts: Vec<Part> = channels.chain(runs).filter(has_structure).collect();
+    let mut list: Vec<(Part, f64)> = parts.into_iter().map(|part| (part, left(part))).collect();
+    list.retain(|(_, left)| *left <= (1.0 - MAIN_PART) * total);
+    list.sort_by(|a, b| a.1.total_cmp(&b.1));
+    list.into_iter().map(|(part, _)| part).collect()
+}
+
+/// Chi-square above the number of values, of each channel of each record that `counts`.
+fn above(problem: &Problem, state: &State, counts: impl Fn(usize, usize) -> bool) -> f64 {
+    let cells = (0..problem.records.len()).flat_map(|record| (0..CHANNELS).map(move |channel| (record, channel)));
+    let of = |(record, channel): (usize, usize)| {
         let values = noise::channel(problem, &state.residual, record, channel);
         let count = values.iter().filter(|v| **v != 0.0).count();
         (dot(&values, &values) - count as f64).max(0.0)
     };
-    let records = 0..problem.records.len();
-    let cells: Vec<(usize, usize, f64)> = records
-        .clone()
-        .flat_map(|record| (0..CHANNELS).map(move |channel| (record, channel)))
-        .map(|(record, channel)| (record, channel, above(record, channel)))
-        .collect();
-    let total: f64 = cells.iter().map(|cell| cell.2).sum();
-    let share = |part: Part| {
-        let own = cells
-            .iter()
-            .filter(|(record, channel, _)| part.holds(*record, *channel));
-        own.map(|cell| cell.2).sum::<f64>() / total.max(f64::MIN_POSITIVE)
+    cells
+        .filter(|(record, channel)| counts(*record, *channel))
+        .map(of)
+        .sum()
+}
+
+/// What the best of the causes that lead leaves above the noise where channel `n` is not compared.
+fn left_by_one_cause(whole: &Examined, n: usize) -> f64 {
+    let attribution = &whole.attribution;
+    let mut problem = whole.problem.clone();
+    for masked in &mut problem.masked {
+        masked[n].fill(true);
+    }
+    let null = State::settle(&problem, &attribution.null.model, &attribution.null.starts, None);
+    let basis = problem.basis(&null.model, &null.starts, &null.residual);
+    let fitter = Fitter {
+        problem: &problem,
+        candidates: &attribution.candidates,
+        basis: &basis,
+        null: &null,
+        effort: ROUGH,
     };
-    let channels = (0..CHANNELS).filter(|n| may_miss(problem, *n)).map(Part::Channel);
-    let runs = records
-        .filter(|_| problem.records.len() > FEWEST_RECORDS)
-        .map(Part::Record);
-    let mut list: Vec<(Part, f64)> = channels.chain(runs).map(|part| (part, share(part))).collect();
-    list.retain(|(part, share)| {
-        let has_structure = whole.structure.iter().any(|one| match part {
-            Part::Channel(n) => one.channel == CHANNEL_NAMES[*n],
-            Part::Record(index) => one.record == problem.records[*index].name,
-        });
-        has_structure && *share >= MAIN_PART
+    let mut singles: Vec<&Fit> = attribution.singles.iter().collect();
+    singles.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+    let fits = parallel::map(&singles[..LEADERS.min(singles.len())], |fit| {
+        fitter.from(&fit.causes, &fit.values, &null)
     });
-    list.sort_by(|a, b| b.1.total_cmp(&a.1));
-    list.into_iter().map(|(part, _)| part).collect()
+    let left = |problem: &Problem, state: &State| above(problem, state, |_, _| true);
+    let states = fits.iter().map(|fit| &fit.state).chain([&null]);
+    let best = states.min_by(|a, b| left(&problem, a).total_cmp(&left(&problem, b)));
+    let best = best.unwrap_or(&null);
+    // only a rank: what it takes to believe in the instants is asked when they are needed
+    let inside = instants::freed(&problem, best, 1.0).map(|(freed, inside)| left(&freed, &inside));
+    inside.unwrap_or(f64::INFINITY).min(left(&problem, best))
 }
 
 /// Whether enough is measured without a channel, and it is no input of the model.

@@ -22,6 +22,10 @@ const HISTORY: usize = 9;
 /// Time constant that stands for the mean over a settled point, periods: it lets through less than 0.2 % of a
 /// ripple at the switching frequency.
 const AVERAGED: f64 = 100.0;
+/// Periods after which a settled point is taken as it is. Models that are tried may have none: an inductor that keeps a twentieth of its
+/// inductance above a current that the ripple crosses jumps between two states.
+// the slowest point of the plant's own tests takes 9 steps of Newton, of 16 periods each, and 56 where one is in vain; this is 35 of those
+const MOST_PERIODS: u32 = 2_000;
 /// Two instants closer than this share of a period are one: 0.1 ps at 10 kHz, far above the rounding of sums of periods.
 const SAME: f64 = 1e-9;
 
@@ -94,6 +98,13 @@ impl Model {
 /// where the model is no plant.
 #[must_use]
 pub fn simulate(model: &Model, record: &Record, begin: &Begin<'_>) -> Vec<[f64; CHANNELS]> {
+    simulate_counted(model, record, begin).0
+}
+
+/// [`simulate`], and the periods that were run: the rows of a course, and those in which settled points were sought.
+#[must_use]
+pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>) -> (Vec<[f64; CHANNELS]>, u64) {
+    let mut periods = 0;
     let mut shown = vec![[f64::NAN; CHANNELS]; record.rows()];
     let stripped;
     let model = match record.duty_is {
@@ -153,15 +164,20 @@ pub fn simulate(model: &Model, record: &Record, begin: &Begin<'_>) -> Vec<[f64; 
             p.source.ripple_phase = turns - turns.floor();
         }
         // a fit may try numbers that are no converter: NaN costs it that step, and not the diagnosis
-        let Ok(mut plant) = Plant::new(&p) else { return shown };
+        let Ok(mut plant) = Plant::new(&p) else {
+            return (shown, periods);
+        };
         plant.lengthen(longer);
         match record.settled {
             true if driver.repeats(segment.start) => shown[segment.start] = shown[segment.start - 1],
-            true => driver.settle(&mut plant, segment.start, start, &mut shown),
-            false => driver.run(&mut plant, segment, start, &mut shown),
+            true => periods += driver.settle(&mut plant, segment.start, start, &mut shown),
+            false => {
+                driver.run(&mut plant, segment, start, &mut shown);
+                periods += segment.len() as u64;
+            }
         }
     }
-    shown
+    (shown, periods)
 }
 
 /// Whether late edges would make of a trim what no line through its origin describes: where a synchronous leg's current is negative a late
@@ -256,11 +272,13 @@ impl Driver<'_> {
         record.repeated && row > 0 && record.is_same_point(row - 1, row)
     }
 
-    fn settle(&self, plant: &mut Plant, row: usize, start: &Start, shown: &mut [[f64; CHANNELS]]) {
+    /// The settled point of a row; the periods that it took.
+    fn settle(&self, plant: &mut Plant, row: usize, start: &Start, shown: &mut [[f64; CHANNELS]]) -> u64 {
         let (duty, load) = (self.record.duty[row], &self.load[row]);
         plant.reset_within(start[0], start[1], load, &[duty; HISTORY]);
-        let (last, _) = plant.rest(duty, load);
-        shown[row] = array(&last.measured);
+        let found = plant.rest_within(duty, load, MOST_PERIODS);
+        shown[row] = array(&found.sample.measured);
+        u64::from(found.periods)
     }
 }
 

@@ -9,13 +9,13 @@ use measured::DutyIs;
 
 use crate::capture::terms::Drive;
 use crate::causes::{Bases, Knob};
-use crate::drive::{Begin, Model, Start, simulate};
+use crate::drive::{Begin, Model, Start, simulate_counted};
 use crate::flicker;
 use crate::ideal::{self, Ideal};
 use crate::noise::Outlier;
 use crate::record::{CHANNELS, LOAD_CURRENT, Record};
 use crate::work::Work;
-use setup::{bases, cut_unstable, share_source_voltage};
+use setup::{bases, cut_unstable, leave_out_collapse, share_source_voltage};
 
 /// What stands in a residual where no number is simulated: far beyond any real error, and its square still a number.
 pub const LOST: f64 = 1e6;
@@ -157,6 +157,7 @@ impl Problem {
         share_source_voltage(&mut records, base.plant.converter.v_in);
         let bases = bases(&records, &base);
         for record in &mut records {
+            leave_out_collapse(record, bases.v);
             cut_unstable(record, &base, bases.v);
         }
         let mut offsets = Vec::with_capacity(records.len());
@@ -301,8 +302,8 @@ impl Problem {
                 out[range].copy_from_slice(&left);
                 continue;
             }
-            self.work.add(model, record);
-            let shown = simulate(model, record, &starts.of(index));
+            let (shown, periods) = simulate_counted(model, record, &starts.of(index));
+            self.work.add(model, record, periods);
             for segment in &record.segments {
                 let first = if record.settled {
                     segment.start

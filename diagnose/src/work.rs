@@ -26,8 +26,6 @@ const STEPS: f64 = 4.0;
 // 600 rows of it take .1 s. A bend of the inductor or of the capacitor beside a cable asks for them, since no matrix stands for the steps
 // there: a fit went to one of 2 nH and .5 ohm, and stayed for four minutes at 4,000 steps
 const MOST_STEPS: f64 = 600.0;
-/// What a settled point costs: it is sought over many periods.
-const SETTLED: u64 = 30;
 /// And in units of those of the model as given.
 // a convention: a time constant fitted to a quarter of the given one
 const DEARER: f64 = 4.0;
@@ -65,8 +63,8 @@ impl Work {
         self.1
     }
 
-    /// A record is simulated.
-    pub(crate) fn add(&self, model: &Model, record: &Record) {
+    /// A record has been simulated, over so many periods.
+    pub(crate) fn add(&self, model: &Model, record: &Record, periods: u64) {
         let p = &model.plant;
         let is_lagged = p.load.cpl_time_constant > 0.0 && record.load.iter().any(|load| load.power != 0.0);
         let of_plant = match (p.cable.inductance > 0.0, p.source.c_in > 0.0) {
@@ -76,9 +74,7 @@ impl Work {
             (false, false) => 1,
         };
         let of_steps = (plant::steps_per_period(p) / STEPS) as u64;
-        let of_record = if record.settled { SETTLED } else { 1 };
-        let of_row = of_plant.max(of_steps).saturating_mul(of_record);
-        self.count((record.rows() as u64).saturating_mul(of_row));
+        self.count(periods.saturating_mul(of_plant.max(of_steps)));
     }
 
     /// Whether a fit may look at a model: a corner of what its parameters may be can take longer than all the rest. A model that was given

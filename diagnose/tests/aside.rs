@@ -217,6 +217,35 @@ fn a_cause_beside_a_disturbed_channel_is_named_and_the_channel_shown() {
     assert!(findings.gain.heldout.iter().any(|held| held.channel == "i_o"));
 }
 
+/// The cause is a thousand times what the drift is, and takes most of it up as long as the channel is compared.
+#[test]
+fn a_channel_that_drifts_by_little_beside_a_large_cause_is_set_aside() {
+    let bench = Bench {
+        v_in: 188.0,
+        dcr: 0.1,
+        ..Bench::default()
+    };
+    let mut random = Noise(91);
+    let fine = [("v_out", 0.01, 1e-3), ("i_l", 5e-3, 1e-3), ("i_out", 5e-3, 1e-3)];
+    let tables = runs(&bench).map(|mut table| {
+        let shown = table.column("i_l");
+        let count = shown.len() as f64;
+        (shown.iter_mut().enumerate()).for_each(|(n, value)| *value += 0.3 * (n as f64 / count - 0.3));
+        table.measured(&fine, &mut random).without(&["v_in"])
+    });
+    let read = |n: usize| tables[n].read(["duty", "load", "held"][n], &model()).unwrap();
+    let findings = diagnose(&model(), vec![read(0), read(1)], &[read(2)], &|_| ()).findings;
+    let ids: Vec<&str> = findings.causes.iter().map(|cause| cause.id).collect();
+    assert_eq!(
+        (findings.verdict, &ids[..]),
+        (Verdict::MostlyExplained, &["v_in_wrong"][..]),
+        "{}",
+        findings.sentence
+    );
+    let v_in = &findings.causes[0].parameters["v_in"];
+    assert!(v_in.low <= 188.0 && 188.0 <= v_in.high, "{v_in:?}");
+}
+
 #[test]
 fn a_current_probe_that_sticks_while_the_filter_rings_is_an_instrument() {
     // hardly damped: what the probe leaves of the current swings as the filter does, and the voltage has nothing of it

@@ -106,6 +106,26 @@ fn another_kind_of_converter_is_named_at_one_duty() {
     is_named("buck-boost", &findings, "looks like that of a buck-boost");
 }
 
+/// Its inductor carries more than thirty times what a buck's would: no unit is wrong.
+#[test]
+fn settled_points_of_a_buck_boost_near_its_largest_duty_are_named() {
+    let model =
+        "[converter]\nrectifier = \"synchronous\"\nv_in = 5.0\ninductance = 1e-4\ncapacitance = 4e-5\nf_sw = 3e4\n";
+    let model = Parameters::from_toml("plant.toml".as_ref(), model).unwrap();
+    let mut columns: [Vec<f64>; 6] = Default::default();
+    for n in 0..12 {
+        let (d, ohm) = ([0.93, 0.93, 0.45, 0.7][n % 4], 3.0 + 0.6 * n as f64);
+        // volt-seconds: d v_in = (1 - d) v + 0.01 ohm of the inductor's v / ohm / (1 - d)
+        let v = d * 5.0 / (1.0 - d + 0.01 / (ohm * (1.0 - d)));
+        let noise = 1.0 + 1e-3 * ((n * 7 % 5) as f64 - 2.0);
+        let row = [d, v * noise, v / ohm / (1.0 - d) / noise, v / ohm, 5.0, ohm];
+        (columns.iter_mut().zip(row)).for_each(|(column, value)| column.push(value));
+    }
+    let names = ["duty", "v_out", "i_l", "i_out", "v_in", "r_load"];
+    let table = Table(names.map(str::to_owned).into_iter().zip(columns).collect());
+    is_named("settled", &found(&model, &table), "looks like that of a buck-boost");
+}
+
 /// Each stands near a fault of the bench, and is a cause: a supply by as much as 1 - 2 d, a gain on the way to a half.
 #[test]
 fn a_cause_that_comes_near_a_misreading_is_sought() {

@@ -228,3 +228,40 @@ fn a_dead_time_just_beyond_what_edges_do_is_named_and_withholds_nothing() {
     };
     assert!((0.0013..=0.0023).contains(&share), "{value:?}");
 }
+
+/// Settled points of a synchronous converter of 48 V by the balance of its volt-seconds, both voltmeters of one reference that is off by `gain`.
+fn synchronous(gain: f64, random: &mut Noise) -> Table {
+    let names = ["duty", "v_out", "i_l", "i_out", "v_in", "r_load"];
+    let mut table = Table::of(&names);
+    for n in 0..24 {
+        let d = 0.15 + 0.7 * f64::from(n) / 23.0;
+        let i = random.between(2.0, 10.0);
+        let v = d * 48.0 - i * (0.02 + 0.03);
+        table.push(&[d, v * gain, i, i, 48.0 * gain, v / i]);
+    }
+    let digits = ["v_out", "i_l", "i_out", "v_in"].map(|name| (name, 5e-3, 1e-3));
+    table.measured(&digits, random)
+}
+
+fn of_points(table: &Table) -> Findings {
+    let text = "[converter]\nrectifier = \"synchronous\"\nv_in = 48.0\ninductance = 22e-6\ncapacitance = 100e-6\nf_sw = 200e3\n\
+                [inductor]\ndcr = 0.02\n[switch]\nr_ds_on = 0.03\nr_ds_on_low = 0.03\n";
+    let model = plant::Parameters::from_toml("plant.toml".as_ref(), text).unwrap();
+    let record = table.read("points", &model).unwrap();
+    let findings = diagnose(&model, vec![record], &[], &|_| {}).findings;
+    println!("{}", findings.sentence);
+    findings
+}
+
+#[test]
+fn one_reference_of_two_voltmeters_is_one_cause() {
+    let findings = of_points(&synchronous(1.03, &mut Noise(32)));
+    let cause = only(&findings);
+    assert_eq!(cause.id, "v_gain", "{}", findings.sentence);
+    assert!(
+        findings.sentence.contains("output and input voltage"),
+        "{}",
+        findings.sentence
+    );
+    holds(cause, "gain", 1.03);
+}

@@ -52,7 +52,7 @@ pub use parameters::{
 };
 pub use plant::{Plant, PlantState};
 pub use reader::REQUIRED;
-pub use settle::{Regulator, Settled};
+pub use settle::{Regulator, Rest, Settled};
 pub use signals::{Load, Sample, Signals};
 pub use surroundings::Surroundings;
 pub use toml_input::{Fault, Faults, Place};

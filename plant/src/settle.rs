@@ -20,6 +20,17 @@ pub struct Settled {
     pub periods: u32,
 }
 
+/// How [`Plant::rest_within`] ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rest {
+    /// The last sample.
+    pub sample: Sample,
+    /// Whether the plant repeats itself.
+    pub rests: bool,
+    /// Periods that were run at most.
+    pub periods: u32,
+}
+
 /// A slow current-mode regulator: holds a voltage also under a load that is unstable in open loop.
 #[derive(Debug, Clone, Copy)]
 pub struct Regulator {
@@ -109,6 +120,9 @@ const AT_REST_1: f64 = 1e-9;
 // the tests hold from 1e-10 to 1e-3: Newton corrects a coarse slope in the next step
 // rounding of 1e-16 then costs the derivative 1e-10 of its value
 const NUDGE: f64 = 1e-6;
+/// Shares of a Newton step that are tried.
+// halves, and a twentieth where the map bends sharply; the tests take all, but hold without the small ones
+const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.05];
 
 impl Plant {
     /// Runs the plant under `load` until its sampled output voltage rests at `v_out` V, held by a [`Regulator`] on the
@@ -160,16 +174,32 @@ impl Plant {
     /// which would ring for ever, and a load that is unstable in open loop have a steady state as well. Where there is none
     /// (ripple of the source, a duty that jumps between two steps) the plant is only run.
     pub fn rest(&mut self, duty: f64, load: &Load) -> (Sample, bool) {
+        let found = self.rest_within(duty, load, u32::MAX);
+        (found.sample, found.rests)
+    }
+
+    /// [`Plant::rest`] that gives up after `most` periods or some tens more, and tells how many it has run.
+    pub fn rest_within(&mut self, duty: f64, load: &Load, most: u32) -> Rest {
         // a duty that stands still has no rate, however it was reached
         self.state.slow = duty;
         self.run(WARM_UP, duty, load);
+        let mut periods = WARM_UP;
         for _ in 0..MOST_NEWTON {
+            if periods >= most {
+                break;
+            }
             let before = *self.state();
             let (after, distance) = self.moved(duty, load);
             if distance < AT_REST_1 {
                 // Newton moves states only; queues and delayed sensors follow by running
-                return (self.run(WARM_UP, duty, load), true);
+                let sample = self.run(WARM_UP, duty, load);
+                return Rest {
+                    sample,
+                    rests: true,
+                    periods: periods + 1 + WARM_UP,
+                };
             }
+            periods += 1 + STATES as u32;
             let mut jacobian = [[0.0; STATES]; STATES];
             for column in 0..STATES {
                 let mut nudged = before;
@@ -186,22 +216,34 @@ impl Plant {
                 line[n] -= 1.0;
             }
             eliminate(&mut jacobian, &mut right);
+            periods += SHARES.len() as u32;
             if !self.improve(&before, &right, distance, duty, load) {
                 self.restore(&before);
                 self.run(BETWEEN, duty, load);
+                periods += BETWEEN;
             }
         }
-        let mut last = self.run(1, duty, load);
+        let mut sample = self.run(1, duty, load);
         // where Newton finds nothing there is mostly no rest: a quarter is a convention, no test needs more than one
-        for _ in 0..MOST_PERIODS / 4 {
+        let end = most.min(periods.saturating_add(MOST_PERIODS / 4));
+        while periods < end {
             let now = self.step(duty, load);
-            let moved = (now.v_out - last.v_out).abs() + (now.i_l - last.i_l).abs();
-            last = now;
+            periods += 1;
+            let moved = (now.v_out - sample.v_out).abs() + (now.i_l - sample.i_l).abs();
+            sample = now;
             if moved < AT_REST_1 * (1.0 + now.v_out.abs()) {
-                return (last, true);
+                return Rest {
+                    sample,
+                    rests: true,
+                    periods,
+                };
             }
         }
-        (last, false)
+        Rest {
+            sample,
+            rests: false,
+            periods,
+        }
     }
 
     fn run(&mut self, periods: u32, duty: f64, load: &Load) -> Sample {
@@ -219,8 +261,7 @@ impl Plant {
 
     /// Takes as much of a Newton step as brings the plant nearer to rest; `false` if none does.
     fn improve(&mut self, before: &PlantState, step: &States, distance: f64, duty: f64, load: &Load) -> bool {
-        // halves, and a twentieth where the map bends sharply; the tests take all, but hold without the small ones
-        for share in [1.0, 0.5, 0.25, 0.05] {
+        for share in SHARES {
             let mut tried = *before;
             for (x, change) in tried.x.iter_mut().zip(step) {
                 *x += share * change;
@@ -265,6 +306,31 @@ fn eliminate(matrix: &mut [States; STATES], right: &mut States) {
 #[cfg(test)]
 mod tests {
     use crate::{Load, Parameters, Plant};
+
+    /// Above a current that its ripple crosses the inductor keeps a twentieth of its inductance.
+    #[test]
+    fn a_search_for_rest_ends_where_it_is_told_to() {
+        let text = "[converter]\nrectifier = \"synchronous\"\nv_in = 150.0\ninductance = 1.5e-3\ncapacitance = 6.1e-7\nf_sw = 135e3\n\
+                    [inductor]\ndcr = 0.79\nsaturation = 0.95\ni_sat = 0.15623283395557594\nsteepness = 31.43364556985805\n\
+                    [capacitor]\nesr = 1.3\n[switch]\nr_ds_on = 1.0\nr_ds_on_low = 2.2\nv_f = 0.74\nr_d = 0.55\ndead_time = 1.4e-7\n";
+        let mut parameters = Parameters::from_toml("plant.toml".as_ref(), text).unwrap();
+        parameters.sensors.v_out.low_pass = 100.0 / 135e3;
+        let load = Load::resistor(1.0 / 0.00506);
+        let run = |most: u32| {
+            let mut plant = Plant::new(&parameters).unwrap();
+            plant.reset_within(132.1, 0.6575, &load, &[0.92; 9]);
+            plant.rest_within(0.92, &load, most)
+        };
+        let (short, long) = (run(300), run(u32::MAX));
+        assert!(!short.rests && (300..400).contains(&short.periods), "{short:?}");
+        assert!(long.periods > 5_000 || long.rests, "{long:?}");
+        // what rests soon is the same however long it may take
+        let parameters = Parameters::paper_model();
+        let load = Load::resistor(20.0);
+        let run = |most: u32| Plant::new(&parameters).unwrap().rest_within(0.5, &load, most);
+        assert_eq!(run(300), run(u32::MAX));
+        assert!(run(300).rests);
+    }
 
     #[test]
     fn a_filter_without_losses_has_a_steady_state() {

@@ -21,14 +21,13 @@ pub const FIRST: Part = Part(&[
     ("new", contract::new),
     ("map", map::map),
     ("loop", loops::step),
-    ("simulate", loops::simulate),
 ]);
 
 /// The generated code.
 pub const CODE: Part = Part(&[("compile", code::compile)]);
 
-/// The diagnosis of records.
-pub const RECORDS: Part = Part(&[("diagnose", records::diagnose)]);
+/// What writes reports: the diagnosis of records, and all instants of load steps.
+pub const REPORTS: Part = Part(&[("diagnose", records::diagnose), ("simulate", loops::simulate)]);
 
 impl Part {
     /// How a request is answered, if it is of this part.

@@ -11,7 +11,7 @@ const PAGE: [(&str, &str); 5] = [
     ("index.html", "<!DOCTYPE html>"),
     ("studio.wasm", "\0asm first"),
     ("code.wasm", "\0asm code"),
-    ("records.wasm", "\0asm records"),
+    ("reports.wasm", "\0asm reports"),
     ("examples/buck/policy.toml", "name = \"buck\""),
 ];
 
@@ -46,7 +46,7 @@ fn a_page_is_written_as_files_with_folders_and_again_over_itself() {
 
 #[test]
 fn a_folder_that_lacks_a_module_is_no_page_and_nothing_is_written() {
-    for lacking in ["index.html", "studio.wasm", "code.wasm", "records.wasm"] {
+    for lacking in ["index.html", "studio.wasm", "code.wasm", "reports.wasm"] {
         let desk = desk_with_page();
         std::fs::remove_file(desk.path("page").join(lacking)).unwrap();
         desk.refuse(

@@ -84,7 +84,7 @@ mod tests {
             ("index.html", "page"),
             ("studio.wasm", "code"),
             ("code.wasm", ""),
-            ("records.wasm", ""),
+            ("reports.wasm", ""),
             ("examples/a/p.toml", "x = 1"),
         ] {
             let path = folder.path().join(name);

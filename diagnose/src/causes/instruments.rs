@@ -139,10 +139,17 @@ pub(super) const SAMPLING_DELAY: Cause = Cause {
 pub(super) const V_GAIN: Cause = Cause {
     id: "v_gain",
     kind: Kind::Instrument,
-    forms: &[form(
-        "gain of the output voltage sensor",
-        &[knob("gain", &["sensors.v_out.gain"], GAIN)],
-    )],
+    forms: &[
+        form(
+            "gain of the output voltage sensor",
+            &[knob("gain", &["sensors.v_out.gain"], GAIN)],
+        ),
+        // converters of one reference
+        form(
+            "gain of the sensors of output and input voltage",
+            &[knob("gain", &["sensors.v_out.gain", "sensors.v_in.gain"], GAIN)],
+        ),
+    ],
 };
 
 pub(super) const V_OFFSET: Cause = Cause {

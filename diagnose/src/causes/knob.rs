@@ -13,6 +13,8 @@ pub struct Bases {
     pub v_in: f64,
     /// Switching period, s.
     pub t_sw: f64,
+    /// Frequency at which the output filter of a buck of these parts swings, Hz.
+    pub filter: f64,
 }
 
 /// How a parameter may move: lowest, highest, and the step that counts as one.
@@ -39,6 +41,9 @@ pub(crate) enum Reach {
     Current(f64, f64, f64),
     /// In switching periods.
     Time(f64, f64, f64),
+    /// Below what the output filter swings at: lowest and highest in hertz, the share of the filter's frequency that is the highest where
+    /// that is more, and the step in hertz.
+    BelowFilter(f64, f64, f64, f64),
     /// As it is.
     Plain(f64, f64, f64),
     /// The share that a part loses along its curve: lowest, highest and step. A part may lose all of it, so that the upper end, close to all,
@@ -174,6 +179,7 @@ impl Knob {
             Reach::Voltage(low, high, step) => by(bases.v, low, high, step),
             Reach::Current(low, high, step) => by(bases.i, low, high, step),
             Reach::Time(low, high, step) => by(bases.t_sw, low, high, step),
+            Reach::BelowFilter(low, high, share, step) => [low, high.max(share * bases.filter), step],
             Reach::Plain(low, high, step) | Reach::Share(low, high, step) => [low, high, step],
         }
     }

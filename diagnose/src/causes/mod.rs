@@ -242,12 +242,20 @@ pub fn candidates(model: &Model, bases: &Bases) -> Vec<Candidate> {
     let causes = CAUSES.iter().enumerate();
     // the plant has no such inductance where the leg interrupts the capacitor's current at every edge
     let is_buck = model.plant.converter.topology == Topology::Buck;
+    let value = |key: &&str| plant::parameter(key).map(|parameter| parameter.get(&model.plant));
+    let is_one = |knob: &Knob| {
+        knob.keys
+            .iter()
+            .all(|key| value(key) == knob.keys.first().and_then(value))
+    };
     let is_known = |form: &Form| {
         let resistors = form.knobs.iter().filter(|knob| knob.resistor.is_some()).count();
         (resistors == 0 || resistors == model.resistors.len())
             // what cuts off is an offset of half a count beside a counter, and takes the place of another
             && (form.search != Search::Counter(Cut::Below) || model.plant.pwm.duty_offset == 0.0)
             && (is_buck || !form.knobs.iter().any(|knob| knob.keys.contains(&"capacitor.esl")))
+            // one value for numbers that differ in the model is no place to begin
+            && (form.search != Search::Own || form.knobs.iter().all(is_one))
     };
     causes
         .flat_map(|(number, cause)| cause.forms.iter().map(move |form| (number, cause, form)))
@@ -274,6 +282,25 @@ mod tests {
     }
 
     #[test]
+    fn a_ripple_of_the_source_is_sought_below_the_filter_and_up_to_mains_at_least() {
+        let text = "[converter]\nv_in = 48.0\ninductance = 22e-6\ncapacitance = 330e-6\nf_sw = 200e3\n";
+        let model = Model::new(&plant::Parameters::from_toml("plant.toml".as_ref(), text).unwrap());
+        let highest = |filter: f64| {
+            let bases = Bases {
+                v: 12.0,
+                i: 5.0,
+                v_in: 48.0,
+                t_sw: 5e-6,
+                filter,
+            };
+            let all = candidates(&model, &bases);
+            let ripple = all.iter().find(|one| one.cause.id == "input_ripple").unwrap();
+            ripple.ranges[1][1]
+        };
+        assert_eq!([highest(1.9e3), highest(3e4)], [2e3, 1.5e4]);
+    }
+
+    #[test]
     fn a_number_that_is_certain_takes_its_causes_away() {
         let text = "[converter]\nv_in = 48.0\ninductance = 22e-6\ncapacitance = 330e-6\nf_sw = 200e3\n";
         let model = Model::new(&plant::Parameters::from_toml("plant.toml".as_ref(), text).unwrap());
@@ -282,6 +309,7 @@ mod tests {
             i: 5.0,
             v_in: 48.0,
             t_sw: 5e-6,
+            filter: 1.9e3,
         };
         let candidates = candidates(&model, &bases);
         let left = |key: &str| {

@@ -205,12 +205,14 @@ pub(super) const INPUT_RIPPLE: Cause = Cause {
     forms: &[searched(
         "line harmonic on the source",
         &[
-            // 40 V at 200 V, seven times what is hidden; the frequencies are those of mains, whatever the converter
+            // 40 V at 200 V, seven times what is hidden
             knob("ripple", &["source.ripple"], Reach::Source(0.0, 0.2, 0.002)),
             knob(
                 "frequency",
                 &["source.ripple_frequency"],
-                Reach::Plain(10.0, 2000.0, 2.0),
+                // of mains, whatever the converter, or of a converter before this one. Near the filter's own frequency its swings behind steps
+                // would pass for a line; a boost's filter swings at down to half of a buck's with its parts
+                Reach::BelowFilter(10.0, 2000.0, 0.5, 2.0),
             ),
             knob("phase", &["source.ripple_phase"], Reach::Plain(-1.0, 1.0, 0.02)),
         ],

@@ -9,7 +9,10 @@ use crate::record::Record;
 /// Growth of a state over a segment of an unstable record, in time constants: an error of the initial state grows e^2, sevenfold,
 /// and the least-squares problem stays close to linear. At 4 it grows 55-fold. A convention.
 const MOST_GROWTH: f64 = 2.0;
-/// Shortest segment of an unstable record, rows: each costs two unknowns, of 30 rows of two signals.
+/// Output over its usual voltage below which electronic loads leave their setting: those of data sheets need .1 to 1 V at full current, a
+/// tenth of what they are set to at a few volts.
+const COLLAPSED: f64 = 0.1;
+/// Shortest segment of an unstable or a collapsed record, rows: each costs two unknowns, of 30 rows of two signals.
 const SHORTEST: usize = 30;
 
 /// Records at clearly different source voltages were set so; a common deviation is the model's.
@@ -57,7 +60,45 @@ pub(super) fn bases(records: &[Record], base: &Model) -> Bases {
         i: if i > 0.0 { i } else { 1.0 },
         v_in,
         t_sw: base.plant.t_sw(),
+        filter: base.plant.converter.f_sw / ideal.swing(),
     }
+}
+
+/// Takes rows at which the output has collapsed under a load that is set as a current or a power out of the segments, and says so: what such a
+/// load draws near 0 V is how it is built, and no number of the plant.
+pub(super) fn leave_out_collapse(record: &mut Record, v: f64) {
+    let is_set = record.load.iter().any(|load| load.current != 0.0 || load.power != 0.0);
+    if record.settled || !is_set {
+        return;
+    }
+    let collapsed: Vec<bool> = record.measured[0].iter().map(|shown| *shown < COLLAPSED * v).collect();
+    let count = collapsed.iter().filter(|row| **row).count();
+    // in a record that is mostly so the base voltage is none
+    if count == 0 || 2 * count > record.rows() {
+        return;
+    }
+    let mut pieces = Vec::new();
+    for segment in &record.segments {
+        let mut start = segment.start;
+        for row in segment.clone().chain([segment.end]) {
+            if row == segment.end || collapsed[row] {
+                if row >= start + SHORTEST {
+                    pieces.push(start..row);
+                }
+                start = row + 1;
+            }
+        }
+    }
+    if pieces.is_empty() {
+        return;
+    }
+    record.segments = pieces;
+    record.repairs.push(format!(
+        "in {count} of {} rows v_out is below {:.0} % of what it usually is: the record is taken without them, since a load that is set as a current \
+         or a power draws what it likes there",
+        record.rows(),
+        100.0 * COLLAPSED
+    ));
 }
 
 /// A constant-power load in open loop may be unstable: such a record is simulated in short pieces.
@@ -88,4 +129,47 @@ pub(super) fn cut_unstable(record: &mut Record, base: &Model, v: f64) {
         }
     }
     record.segments = pieces;
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+    use std::path::Path;
+
+    use measured::{ColumnMap, Sheet};
+    use plant::Parameters;
+
+    use crate::record::Record;
+
+    /// A record of 100 rows around 100 V, of which those in `low` show 4 V.
+    fn record(load: &str, low: std::ops::Range<usize>) -> Record {
+        let mut text = format!("t,d,v_o,{load}\n");
+        for n in 0..100 {
+            let v = if low.contains(&n) {
+                4.0
+            } else {
+                100.0 + 0.01 * (n * 7 % 5) as f64
+            };
+            let _ = writeln!(text, "{:.6},0.5,{v:.3},20", (n as f64 + 0.5) * 1e-4);
+        }
+        let sheet = Sheet::parse(Path::new("a.csv"), text.into(), &Record::file_options()).unwrap();
+        Record::read(&sheet, &ColumnMap::default(), &Parameters::paper_table()).unwrap()
+    }
+
+    #[test]
+    fn an_output_that_collapses_under_a_set_current_cuts_the_record() {
+        let cut = |load: &str, low: std::ops::Range<usize>| {
+            let mut record = record(load, low);
+            super::leave_out_collapse(&mut record, 100.0);
+            let pieces: Vec<[usize; 2]> = record.segments.iter().map(|one| [one.start, one.end]).collect();
+            let is_said = record.repairs.iter().any(|said| said.contains("v_out is below 10 %"));
+            (pieces, is_said)
+        };
+        assert_eq!(cut("i_load", 50..54), (vec![[0, 50], [54, 100]], true));
+        // a piece of 20 rows is none
+        assert_eq!(cut("i_load", 20..24), (vec![[24, 100]], true));
+        assert_eq!(cut("i_load", 0..0), (vec![[0, 100]], false));
+        // what a resistor draws is known at any voltage
+        assert_eq!(cut("r_load", 50..54), (vec![[0, 100]], false));
+    }
 }

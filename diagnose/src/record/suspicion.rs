@@ -1,6 +1,6 @@
 //! Signals whose size or sign says that they are not what their column is called, or not in its unit.
 
-use plant::{Load, Parameters, Topology};
+use plant::{Load, Parameters, Rectifier, Topology};
 use toml_input::Message;
 
 use super::Record;
@@ -131,7 +131,7 @@ fn may_rest(record: &Record, parameters: &Parameters) -> bool {
     let ideal = Ideal::of(record, parameters);
     let may = |(load, duty): &(&Load, &f64)| !ideal.never_rests(ideal::drawn(load, ideal.volts(**duty)), **duty);
     let count = record.load.iter().zip(&record.duty).filter(may).count();
-    !record.settled && count as f64 > MAY_REST * record.rows() as f64
+    count as f64 > MAY_REST * record.rows() as f64
 }
 
 /// What one in twenty values of a signal exceeds in size.
@@ -198,6 +198,11 @@ fn other_kind(record: &Record, parameters: &Parameters) -> Vec<Message> {
         .iter()
         .fold((1.0f64, 0.0f64), |(low, high), d| (low.min(*d), high.max(*d)));
     if duties.1 - duties.0 < AS_OTHER {
+        return Vec::new();
+    }
+    // a current that rests lifts the voltage over what its duty says; that of a buck up to its source
+    let is_beyond = ideal.topology == Topology::Buck && median(record.measured[0].iter().copied()) > ideal.v_in;
+    if parameters.converter.rectifier == Rectifier::Diode && may_rest(record, parameters) && !is_beyond {
         return Vec::new();
     }
     let is_other = |of: &Topology| *of != ideal.topology && off(*of, &|volts, _| volts) < AS_KIND;
@@ -319,13 +324,19 @@ fn sized(record: &Record, parameters: &Parameters, labels: &[&str; CHANNELS]) ->
             }
         }
     }
+    // of a converter that steps up the inductor carries many times what is drawn: then the kind is wrong, and no unit
+    let steps_up = |found: f64| {
+        let (drawn, duty) = (typical(&record.measured[2]), typical(&record.duty));
+        let inductor = drawn.zip(duty).map(|(drawn, duty)| drawn / (1.0 - duty));
+        inductor.is_some_and(|inductor| ratio(found, inductor) < FAR)
+    };
     // where the current may rest it is sampled as 0 or nearly, in most rows perhaps: too small is no size there
-    let rests = may_rest(record, parameters);
+    let rests = !record.settled && may_rest(record, parameters);
     let is_off = |(n, size, found): &&(usize, f64, f64)| {
         match *n == 1 && found < size {
             // where it does not rest its valleys may be small: the unit is that of its peaks
             true => !rests && peak(&record.measured[1]) * OTHER_UNIT < *size,
-            false => ratio(*found, *size) > OTHER_UNIT,
+            false => ratio(*found, *size) > OTHER_UNIT && !(*n == 1 && steps_up(*found)),
         }
     };
     let off = known.iter().filter(is_off);

@@ -2,6 +2,7 @@
 
 mod edges;
 mod forms;
+mod replaced;
 mod singles;
 pub(crate) mod sought;
 mod starts;
@@ -48,6 +49,9 @@ const LOOKED_AT_BY_LEADERS: usize = 3;
 /// Share of what a fit at its limits explains that one within them has to explain to be followed in its place. A convention: what is true
 /// explains about as much as what imitates it.
 const MOST_OF_FIRST: f64 = 0.7;
+
+/// Candidates that are tried in the place of a cause, to find a better one. A convention: each costs a fit.
+const MOST_EXCHANGED: usize = 3;
 
 /// Fits between two looks at the budget: two cores have work, and a fit with a cable takes seconds. A convention, whatever the cores: what is
 /// found must not hang on them.
@@ -327,7 +331,7 @@ impl Searcher<'_> {
                 break;
             }
             let stage = format!("another cause for {}", self.id(best.causes[member]));
-            for other in self.replacements(&best, member, 3, &stage) {
+            for other in self.replacements(&best, member, |looks| top(looks, MOST_EXCHANGED), &stage) {
                 if self.score(&other) < self.score(&best) - SWAP {
                     best = self.polished(&other);
                     break;
@@ -335,21 +339,6 @@ impl Searcher<'_> {
             }
         }
         best
-    }
-
-    /// Fits of the set with other causes in the place of one: those that look best at first order where the kept ones alone
-    /// end.
-    fn replacements(&self, fit: &Fit, member: usize, count: usize, stage: &str) -> Vec<Fit> {
-        let kept = without(&fit.causes, member);
-        let kept = self.fitter.from(&kept, &self.values_of(fit, &kept), self.fitter.null);
-        let columns = self.sensitivities(&kept.causes, &kept.state);
-        let set = Set::of(&kept, &columns);
-        let looks = self.looks(&set, &self.others(&fit.causes), &kept.state);
-        let most = looks.iter().map(|look| look.0).fold(0.0, f64::max);
-        let looks = looks.into_iter().filter(|look| look.0 > FOLLOWED * most).collect();
-        progress::map(self.say, stage, &top(looks, count), |cause| {
-            self.added(&set, *cause, &kept.state)
-        })
     }
 
     /// Whether one of the causes of a set does nothing where it ends: the set is the smaller one without it.
@@ -399,43 +388,6 @@ impl Searcher<'_> {
                 _ => return (Some(best), evidence),
             }
         }
-    }
-
-    /// For each cause of a set, what explains the data as well in its place.
-    pub fn rivals(&self, best: &Fit, evidence: &[f64], singles: &[Fit]) -> Vec<Vec<Fit>> {
-        let members = best.causes.iter().enumerate();
-        members
-            .map(|(member, own)| {
-                let tolerance = (TIE * self.inflation(best)).max(TIE_SHARE * evidence[member]);
-                let all: Vec<Fit> = match best.causes.len() {
-                    1 => singles.to_vec(),
-                    _ => self.replacements(best, member, 8, &format!("rivals of {}", self.id(*own))),
-                };
-                let is_rival = |fit: &Fit| {
-                    let other = fit.causes.last().is_some_and(|cause| !self.same(*cause, *own));
-                    // the trim takes over what such a cause leaves, and is more than it may
-                    let is_left_to_edges = self.asks_for_edges(&fit.state) && !self.asks_for_edges(&best.state);
-                    other
-                        && !is_left_to_edges
-                        && !self.has_nothing(fit)
-                        && fit.state.chi2 <= best.state.chi2 + tolerance
-                };
-                let near = |fit: &Fit| fit.state.chi2 <= best.state.chi2 + NEAR * tolerance;
-                let all: Vec<Fit> = all.into_iter().filter(near).collect();
-                let stage = format!("rivals of {}, those that come near", self.id(*own));
-                let all = progress::map(self.say, &stage, &all, |fit| self.polished(fit));
-                let mut list: Vec<Fit> = all.into_iter().filter(is_rival).collect();
-                list.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
-                let mut seen = Vec::new();
-                list.retain(|fit| {
-                    let number = fit.causes.last().map(|cause| self.number(*cause));
-                    let new = !seen.contains(&number);
-                    seen.push(number);
-                    new
-                });
-                list
-            })
-            .collect()
     }
 }
 

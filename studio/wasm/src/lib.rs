@@ -18,8 +18,8 @@ const PARTS: &[Part] = &[
     studio::FIRST,
     #[cfg(feature = "code")]
     studio::CODE,
-    #[cfg(feature = "records")]
-    studio::RECORDS,
+    #[cfg(feature = "reports")]
+    studio::REPORTS,
 ];
 
 struct Page {

@@ -250,6 +250,18 @@ fn the_filter_swings_with_its_own_period() {
 }
 
 #[test]
+fn a_diode_lets_no_current_back_beside_a_lossy_core() {
+    let mut board = ideal(Topology::Buck);
+    (board.stage.synchronous, board.stage.v_f, board.stage.core) = (false, 0.5, 0.01);
+    let trace = settled(&board, 0.2, resistor(100.0), STEPS);
+    let least = trace.nodes.iter().map(|n| n.i_l).fold(f64::MAX, f64::min);
+    let resting = trace.nodes.iter().filter(|n| n.i_l.abs() < 1e-3).count();
+    // the core takes 0.01 S of some 10 V behind the diode
+    assert!(least > -1e-3, "{least}");
+    assert!(resting > trace.nodes.len() / 10, "{resting} of {}", trace.nodes.len());
+}
+
+#[test]
 fn twice_the_steps_change_next_to_nothing() {
     let mut board = ideal(Topology::Buck);
     (

@@ -73,15 +73,23 @@ impl Walk<'_> {
                 trace.nodes.push(circuit::rates(&step, &self.x, t).1);
             }
             let mut next = circuit::advance(&step, &self.x, t, h);
+            let mut stops = false;
             // a diode lets no current back: the step ends where it would
             let i = self.x[I_L];
-            if matches!(path, Path::Diode | Path::Body) && next[I_L] * i <= 0.0 && i != 0.0 {
-                let share = (i / (i - next[I_L])).clamp(1e-6, 1.0);
-                if share < 1.0 {
-                    h *= share;
-                    next = circuit::advance(&step, &self.x, t, h);
+            if matches!(path, Path::Diode | Path::Body) && i != 0.0 {
+                // what it carries is the winding's current, of which a lossy core takes a part
+                let [before, after] = [&self.x, &next].map(|x| circuit::rates(&step, x, t).1.i_l);
+                if before * i <= 0.0 || after * i <= 0.0 {
+                    let share = match before * i > 0.0 {
+                        true => (before / (before - after)).clamp(1e-6, 1.0),
+                        false => 1e-6,
+                    };
+                    if share < 1.0 {
+                        h *= share;
+                        next = circuit::advance(&step, &self.x, t, h);
+                    }
+                    stops = true;
                 }
-                next[I_L] = 0.0;
             }
             self.after(&next, h);
             t += h;
@@ -98,6 +106,10 @@ impl Walk<'_> {
                     )
                     .1,
                 );
+            }
+            if stops {
+                // what the core still holds is lost at once
+                self.x[I_L] = 0.0;
             }
         }
     }

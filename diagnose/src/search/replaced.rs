@@ -1,0 +1,90 @@
+//! Sets with another cause in the place of one: what is better, and what does as well.
+
+use super::{FOLLOWED, NEAR, Searcher, Set, TIE, TIE_SHARE, top, without};
+use crate::fit::Fit;
+use crate::progress;
+
+/// Candidates that are tried as rivals of a cause beside others. A convention: each costs a fit.
+const MOST_RIVALS: usize = 8;
+
+impl Searcher<'_> {
+    /// Fits of the set with other causes in the place of one: those that are `chosen` of what gains a share of the most at first order, where
+    /// the kept ones alone end.
+    pub(super) fn replacements(
+        &self,
+        fit: &Fit,
+        member: usize,
+        chosen: impl Fn(Vec<(f64, usize)>) -> Vec<usize>,
+        stage: &str,
+    ) -> Vec<Fit> {
+        let kept = without(&fit.causes, member);
+        let kept = self.fitter.from(&kept, &self.values_of(fit, &kept), self.fitter.null);
+        let columns = self.sensitivities(&kept.causes, &kept.state);
+        let set = Set::of(&kept, &columns);
+        let looks = self.looks(&set, &self.others(&fit.causes), &kept.state);
+        let most = looks.iter().map(|look| look.0).fold(0.0, f64::max);
+        let looks = looks.into_iter().filter(|look| look.0 > FOLLOWED * most).collect();
+        progress::map(self.say, stage, &chosen(looks), |cause| {
+            self.added(&set, *cause, &kept.state)
+        })
+    }
+
+    /// Of each cause the form that gains most and the one of fewest parameters: a cause with many forms would take the places of the others, and its
+    /// larger forms that of the one that does the same with a single number.
+    fn of_each_cause(&self, mut looks: Vec<(f64, usize)>) -> Vec<(f64, usize)> {
+        let parameters = |cause: usize| self.fitter.candidates[cause].own.len();
+        looks.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let is_kept = |(place, (_, cause)): &(usize, &(f64, usize))| {
+            let same = || looks.iter().enumerate().filter(|(_, other)| self.same(other.1, *cause));
+            let first = same().map(|(n, _)| n).next();
+            let fewest = same().min_by_key(|(_, other)| parameters(other.1)).map(|(n, _)| n);
+            first == Some(*place) || fewest == Some(*place)
+        };
+        looks
+            .iter()
+            .enumerate()
+            .filter(is_kept)
+            .map(|(_, look)| *look)
+            .collect()
+    }
+
+    /// For each cause of a set, what explains the data as well in its place.
+    pub fn rivals(&self, best: &Fit, evidence: &[f64], singles: &[Fit]) -> Vec<Vec<Fit>> {
+        let members = best.causes.iter().enumerate();
+        members
+            .map(|(member, own)| {
+                let tolerance = (TIE * self.inflation(best)).max(TIE_SHARE * evidence[member]);
+                let all: Vec<Fit> = match best.causes.len() {
+                    1 => singles.to_vec(),
+                    _ => {
+                        let chosen = |looks| top(self.of_each_cause(looks), MOST_RIVALS);
+                        self.replacements(best, member, chosen, &format!("rivals of {}", self.id(*own)))
+                    }
+                };
+                let is_rival = |fit: &Fit| {
+                    let other = fit.causes.last().is_some_and(|cause| !self.same(*cause, *own));
+                    // the trim takes over what such a cause leaves, and is more than it may
+                    let is_left_to_edges = self.asks_for_edges(&fit.state) && !self.asks_for_edges(&best.state);
+                    other
+                        && !is_left_to_edges
+                        && !self.has_nothing(fit)
+                        && fit.state.chi2 <= best.state.chi2 + tolerance
+                };
+                let near = |fit: &Fit| fit.state.chi2 <= best.state.chi2 + NEAR * tolerance;
+                let all: Vec<Fit> = all.into_iter().filter(near).collect();
+                let stage = format!("rivals of {}, those that come near", self.id(*own));
+                let all = progress::map(self.say, &stage, &all, |fit| self.polished(fit));
+                let mut list: Vec<Fit> = all.into_iter().filter(is_rival).collect();
+                list.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+                let mut seen = Vec::new();
+                list.retain(|fit| {
+                    let number = fit.causes.last().map(|cause| self.number(*cause));
+                    let new = !seen.contains(&number);
+                    seen.push(number);
+                    new
+                });
+                list
+            })
+            .collect()
+    }
+}

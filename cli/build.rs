@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// The folder is named by this variable.
 const FOLDER: &str = "POLICYC_STUDIO";
 /// What a page runs.
-const MODULES: [&str; 3] = ["studio.wasm", "code.wasm", "reports.wasm"];
+const MODULES: [&str; 4] = ["studio.wasm", "code.wasm", "records.wasm", "simulate.wasm"];
 
 fn main() -> Result<(), String> {
     println!("cargo::rerun-if-env-changed={FOLDER}");

@@ -5,7 +5,7 @@
 // holds the files of the session for itself.
 
 /// The requests that are not of studio.wasm.
-const MODULES = { compile: "code.wasm", diagnose: "reports.wasm", simulate: "reports.wasm" };
+const MODULES = { compile: "code.wasm", diagnose: "records.wasm", simulate: "simulate.wasm" };
 
 const files = new Map();
 const modules = new Map();

@@ -18,5 +18,5 @@ mod part;
 mod records;
 mod session;
 
-pub use part::{CODE, FIRST, Part, REPORTS};
+pub use part::{CODE, FIRST, Part, RECORDS, SIMULATE};
 pub use session::Session;

@@ -26,8 +26,11 @@ pub const FIRST: Part = Part(&[
 /// The generated code.
 pub const CODE: Part = Part(&[("compile", code::compile)]);
 
-/// What writes reports: the diagnosis of records, and all instants of load steps.
-pub const REPORTS: Part = Part(&[("diagnose", records::diagnose), ("simulate", loops::simulate)]);
+/// The diagnosis of records.
+pub const RECORDS: Part = Part(&[("diagnose", records::diagnose)]);
+
+/// All instants of load steps, with the report of `policyc simulate`.
+pub const SIMULATE: Part = Part(&[("simulate", loops::simulate)]);
 
 impl Part {
     /// How a request is answered, if it is of this part.

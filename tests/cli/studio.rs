@@ -7,11 +7,12 @@ use tests::tools::listing;
 use super::Desk;
 
 /// What a page must have, and a file of an example below it.
-const PAGE: [(&str, &str); 5] = [
+const PAGE: [(&str, &str); 6] = [
     ("index.html", "<!DOCTYPE html>"),
     ("studio.wasm", "\0asm first"),
     ("code.wasm", "\0asm code"),
-    ("reports.wasm", "\0asm reports"),
+    ("records.wasm", "\0asm records"),
+    ("simulate.wasm", "\0asm simulate"),
     ("examples/buck/policy.toml", "name = \"buck\""),
 ];
 
@@ -46,7 +47,13 @@ fn a_page_is_written_as_files_with_folders_and_again_over_itself() {
 
 #[test]
 fn a_folder_that_lacks_a_module_is_no_page_and_nothing_is_written() {
-    for lacking in ["index.html", "studio.wasm", "code.wasm", "reports.wasm"] {
+    for lacking in [
+        "index.html",
+        "studio.wasm",
+        "code.wasm",
+        "records.wasm",
+        "simulate.wasm",
+    ] {
         let desk = desk_with_page();
         std::fs::remove_file(desk.path("page").join(lacking)).unwrap();
         desk.refuse(

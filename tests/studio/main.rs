@@ -18,7 +18,7 @@ const PATIENCE: Duration = Duration::from_secs(300);
 /// The page that `cargo xtask studio` has made; none where WebAssembly cannot be built.
 fn built() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("studio");
-    let made = folder.join("reports.wasm").is_file();
+    let made = folder.join("simulate.wasm").is_file();
     if !made {
         eprintln!("no page of the studio (`cargo xtask studio`): NOT tested");
     }
@@ -193,7 +193,8 @@ const FIRST_LOAD: usize = 900_000;
 fn what_a_visitor_loads_first_is_within_its_aim() {
     let Some(folder) = built() else { return };
     let files = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
-    let first = files.filter(|path| path.is_file() && !path.ends_with("code.wasm") && !path.ends_with("reports.wasm"));
+    let later = ["code.wasm", "records.wasm", "simulate.wasm"];
+    let first = files.filter(|path| path.is_file() && !later.iter().any(|name| path.ends_with(name)));
     let compressed = |path: PathBuf| {
         let packed = Command::new("gzip").arg("-9c").arg(&path).output().unwrap();
         assert!(packed.status.success(), "{}", path.display());

@@ -15,7 +15,12 @@ pub const TARGET: &str = "wasm32-unknown-unknown";
 
 /// The modules of the page, and the features of `studio-wasm` that each holds: the first is what a visitor loads, the others come when
 /// they are wanted.
-const MODULES: [(&str, &str); 3] = [("studio", "first"), ("code", "code"), ("reports", "reports")];
+const MODULES: [(&str, &str); 4] = [
+    ("studio", "first"),
+    ("code", "code"),
+    ("records", "records"),
+    ("simulate", "simulate"),
+];
 
 /// Where the page is made: `policyc studio --from target/studio`.
 pub fn folder(workspace: &Workspace) -> PathBuf {

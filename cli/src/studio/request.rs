@@ -84,7 +84,8 @@ mod tests {
             ("index.html", "page"),
             ("studio.wasm", "code"),
             ("code.wasm", ""),
-            ("reports.wasm", ""),
+            ("records.wasm", ""),
+            ("simulate.wasm", ""),
             ("examples/a/p.toml", "x = 1"),
         ] {
             let path = folder.path().join(name);

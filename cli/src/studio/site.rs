@@ -14,7 +14,13 @@ const MOST_BYTES: u64 = 64 << 20;
 /// Files of a folder at most: that of the page has some thirty.
 const MOST_FILES: usize = 1000;
 /// What a folder of the page must hold.
-const NEEDED: [&str; 4] = ["index.html", "studio.wasm", "code.wasm", "reports.wasm"];
+const NEEDED: [&str; 5] = [
+    "index.html",
+    "studio.wasm",
+    "code.wasm",
+    "records.wasm",
+    "simulate.wasm",
+];
 
 /// Files by their paths, with `/` between folders.
 #[derive(Debug, Clone)]

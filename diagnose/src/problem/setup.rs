@@ -9,8 +9,8 @@ use crate::record::Record;
 /// Growth of a state over a segment of an unstable record, in time constants: an error of the initial state grows e^2, sevenfold,
 /// and the least-squares problem stays close to linear. At 4 it grows 55-fold. A convention.
 const MOST_GROWTH: f64 = 2.0;
-/// Output over its usual voltage below which electronic loads leave their setting: those of data sheets need .1 to 1 V at full current, a
-/// tenth of what they are set to at a few volts.
+/// Output over its usual voltage below which electronic loads may leave their setting: at full current they need some tenths of a volt. A
+/// convention.
 const COLLAPSED: f64 = 0.1;
 /// Shortest segment of an unstable or a collapsed record, rows: each costs two unknowns, of 30 rows of two signals.
 const SHORTEST: usize = 30;

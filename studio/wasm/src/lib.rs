@@ -18,8 +18,10 @@ const PARTS: &[Part] = &[
     studio::FIRST,
     #[cfg(feature = "code")]
     studio::CODE,
-    #[cfg(feature = "reports")]
-    studio::REPORTS,
+    #[cfg(feature = "records")]
+    studio::RECORDS,
+    #[cfg(feature = "simulate")]
+    studio::SIMULATE,
 ];
 
 struct Page {

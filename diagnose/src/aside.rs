@@ -128,9 +128,12 @@ pub fn explained_without(
     if whole.verdict != Verdict::Unexplained || whole.is_misread() || records.iter().any(is_short) {
         return None;
     }
+    let attribution = &whole.attribution;
     let looks = match whole.structure.is_empty() {
+        false => parts(whole, attribution.state(), &whole.structure),
+        // what was fitted took in the disturbance, so that only the model as given shows where it is
+        true if whole.doubts.iter().any(is_of_the_fit) => parts(whole, &attribution.null, &whole.left()),
         true => spoilt_later(whole).into_iter().collect(),
-        false => parts(whole),
     };
     let work = &whole.problem.work.of_part();
     // what the records look like has been said of all of them
@@ -146,7 +149,7 @@ pub fn explained_without(
         }
         let problem = &whole.problem;
         let is_aside = |place: usize| part.has(problem, place);
-        if whole.attribution.is_out_of_reach(problem, &is_aside) {
+        if attribution.is_out_of_reach(problem, &is_aside) {
             return None;
         }
         let mut found = examined(part.taken_from(records), base, work, say);
@@ -170,6 +173,11 @@ pub fn explained_without(
     })
 }
 
+/// Whether a doubt is that causes leave nothing by bending: to more of them than the records tell apart, or to values that no converter has.
+fn is_of_the_fit(doubt: &Doubt) -> bool {
+    matches!(doubt, Doubt::Loose(_) | Doubt::Bound(_))
+}
+
 /// The one channel in which causes that leave no structure do not hold in held-out records: what disturbs it did not show before.
 fn spoilt_later(whole: &Examined) -> Option<Part> {
     let of = |doubt: &Doubt| match doubt {
@@ -182,15 +190,15 @@ fn spoilt_later(whole: &Examined) -> Option<Part> {
 }
 
 /// Parts that may be set aside, the one without which least is left first: by a single cause that is fitted to the rest alone, since what
-/// disturbs a channel bends the causes that are fitted to all, and the others show it.
-fn parts(whole: &Examined) -> Vec<Part> {
-    let (problem, state) = (&whole.problem, whole.attribution.state());
+/// disturbs a channel bends the causes that are fitted to all, and the others show it. What is left is that of `state`, and `structure` in it.
+fn parts(whole: &Examined, state: &State, structure: &[Structure]) -> Vec<Part> {
+    let problem = &whole.problem;
     let channels = (0..CHANNELS).filter(|n| may_miss(problem, *n)).map(Part::Channel);
     let runs = (0..problem.records.len())
         .filter(|_| problem.records.len() > FEWEST_RECORDS)
         .map(Part::Record);
     let has_structure = |part: &Part| {
-        whole.structure.iter().any(|one| match part {
+        structure.iter().any(|one| match part {
             Part::Channel(n) => one.channel == CHANNEL_NAMES[*n],
             Part::Record(index) => one.record == problem.records[*index].name,
         })

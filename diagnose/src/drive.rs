@@ -101,10 +101,19 @@ pub fn simulate(model: &Model, record: &Record, begin: &Begin<'_>) -> Vec<[f64; 
     simulate_counted(model, record, begin).0
 }
 
-/// [`simulate`], and the periods that were run: the rows of a course, and those in which settled points were sought.
+/// What a simulation took time for.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Ran {
+    /// The rows of a course, and the periods in which settled points were sought.
+    pub periods: u64,
+    /// Steps of the plant's integrator in them.
+    pub steps: u64,
+}
+
+/// [`simulate`], and what it took.
 #[must_use]
-pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>) -> (Vec<[f64; CHANNELS]>, u64) {
-    let mut periods = 0;
+pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>) -> (Vec<[f64; CHANNELS]>, Ran) {
+    let mut ran = Ran::default();
     let mut shown = vec![[f64::NAN; CHANNELS]; record.rows()];
     let stripped;
     let model = match record.duty_is {
@@ -165,19 +174,20 @@ pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>
         }
         // a fit may try numbers that are no converter: NaN costs it that step, and not the diagnosis
         let Ok(mut plant) = Plant::new(&p) else {
-            return (shown, periods);
+            return (shown, ran);
         };
         plant.lengthen(longer);
         match record.settled {
             true if driver.repeats(segment.start) => shown[segment.start] = shown[segment.start - 1],
-            true => periods += driver.settle(&mut plant, segment.start, start, &mut shown),
+            true => ran.periods += driver.settle(&mut plant, segment.start, start, &mut shown),
             false => {
                 driver.run(&mut plant, segment, start, &mut shown);
-                periods += segment.len() as u64;
+                ran.periods += segment.len() as u64;
             }
         }
+        ran.steps += plant.steps_taken();
     }
-    (shown, periods)
+    (shown, ran)
 }
 
 /// Whether late edges would make of a trim what no line through its origin describes: where a synchronous leg's current is negative a late

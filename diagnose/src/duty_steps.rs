@@ -357,6 +357,7 @@ mod tests {
                 starts: problem.first_starts(),
                 chi2: dot(&residual, &residual),
                 residual: residual.clone(),
+                rows: 0,
             };
             let basis = problem.basis(&from.model, &from.starts, &from.residual);
             likely(&problem, &basis, (&from, &[]), (Cut::Nearest, 1))

@@ -68,6 +68,8 @@ pub struct State {
     pub residual: Vec<f64>,
     /// Sum of its squares.
     pub chi2: f64,
+    /// What simulating it took, in rows.
+    pub(crate) rows: u64,
 }
 
 /// A fitted set of causes.
@@ -120,9 +122,10 @@ impl State {
     }
 
     pub(crate) fn at(problem: &Problem, model: &Model, starts: Starts) -> Self {
-        let residual = problem.residual(model, &starts);
+        let (residual, rows) = problem.residual_counted(model, &starts);
         State {
             model: model.clone(),
+            rows,
             chi2: dot(&residual, &residual),
             starts,
             residual,
@@ -224,7 +227,8 @@ impl Fitter<'_> {
     /// [`Fitter::from`] with one parameter held at its value.
     #[must_use]
     pub fn holding(&self, causes: &[usize], values: &[f64], from: &State, held: Option<usize>) -> Fit {
-        let fit = self.in_basis(causes, values, from, held);
+        let mut rows = 0;
+        let fit = self.in_basis(causes, values, from, held, &mut rows);
         let count = self.problem.count() as f64;
         if fit.state.chi2 < STILL_OFF * count {
             return fit;
@@ -235,6 +239,7 @@ impl Fitter<'_> {
             starts,
             residual,
             chi2,
+            ..
         } = &fit.state;
         let own = self.problem.basis(model, starts, residual);
         let settle = |starts: &Starts| State::settle_in(self.problem, model, starts, Some(&own), 2);
@@ -245,18 +250,18 @@ impl Fitter<'_> {
             return fit;
         }
         let there = Fitter { basis: &own, ..*self };
-        let again = there.in_basis(causes, &fit.values, &settled, held);
+        let again = there.in_basis(causes, &fit.values, &settled, held, &mut rows);
         if again.state.chi2 < fit.state.chi2 { again } else { fit }
     }
 
     /// The first steps of a fit, without the second look of [`Fitter::holding`].
     pub(crate) fn first_steps(&self, causes: &[usize], values: &[f64], from: &State) -> Fit {
         let fitter = Fitter { effort: FIRST, ..*self };
-        fitter.in_basis(causes, values, from, None)
+        fitter.in_basis(causes, values, from, None, &mut 0)
     }
 
-    /// A fit with what initial states explain at the model as given.
-    fn in_basis(&self, causes: &[usize], values: &[f64], from: &State, held: Option<usize>) -> Fit {
+    /// A fit with what initial states explain at the model as given; `rows` grows by what it takes.
+    fn in_basis(&self, causes: &[usize], values: &[f64], from: &State, held: Option<usize>, rows: &mut u64) -> Fit {
         let places = self.places(causes);
         let (mut state, mut values) = self.state_at(causes, values, from, 2);
         let smooth: Vec<usize> = (0..places.len())
@@ -266,13 +271,14 @@ impl Fitter<'_> {
         // a convention, as Marquardt's factor of ten in `improve`
         let mut damping = 1e-3;
         for _ in 0..self.effort.steps {
-            if smooth.is_empty() {
+            if smooth.is_empty() || Work::is_fit_over(*rows, self.null.rows) {
                 break;
             }
             let round = self.round(&places, &smooth, &state);
+            *rows += round.jacobian.rows;
             // before the step: a fit that cannot improve has a covariance all the same
             round.normal.covariance(&smooth, &round.jacobian.scale, &mut covariance);
-            let Some((next, moved)) = self.improve(&round, &values, &state, &mut damping) else {
+            let Some((next, moved)) = self.improve(&round, &values, &state, &mut damping, rows) else {
                 break;
             };
             let gain = state.chi2 - next.chi2;
@@ -310,10 +316,11 @@ impl Fitter<'_> {
             let range = self.range(places[*n]);
             let (moved, step) = nudged(&state.model, knob, &range);
             // a cable without a capacitor, or a step behind the end: where nothing can be simulated, nothing is learnt
-            let after = match Work::may_simulate(&moved, &self.problem.base) {
-                true => self.problem.residual(&moved, &state.starts),
-                false => state.residual.clone(),
+            let (after, rows) = match Work::may_simulate(&moved, &self.problem.base) {
+                true => self.problem.residual_counted(&moved, &state.starts),
+                false => (state.residual.clone(), 0),
             };
+            jacobian.rows += rows;
             let share = range[2] / step;
             let raw: Vec<f64> = state
                 .residual
@@ -331,13 +338,14 @@ impl Fitter<'_> {
         jacobian
     }
 
-    /// The next state and values, if a step leads to less chi-square; `damping` follows.
+    /// The next state and values, if a step leads to less chi-square; `damping` follows, and `rows` grow by what it takes.
     fn improve(
         &self,
         round: &Round<'_>,
         values: &[f64],
         state: &State,
         damping: &mut f64,
+        rows: &mut u64,
     ) -> Option<(State, Vec<f64>)> {
         // each try damps ten times more: what does not descend with a step of 1e-5 does not descend
         for _ in 0..5 {
@@ -361,6 +369,7 @@ impl Fitter<'_> {
                 let mut starts = state.starts.clone();
                 self.basis.absorb(&left, &mut starts, moving);
                 let next = State::at(self.problem, &model, starts);
+                *rows += next.rows;
                 (next.chi2 < state.chi2).then_some(next)
             });
             if let Some(next) = next {
@@ -421,4 +430,6 @@ struct Jacobian {
     raw: Vec<Vec<f64>>,
     projected: Vec<Vec<f64>>,
     scale: Vec<f64>,
+    /// What the simulations took, in rows.
+    rows: u64,
 }

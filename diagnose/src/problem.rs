@@ -295,15 +295,20 @@ impl Problem {
     /// period leads to it.
     #[must_use]
     pub fn residual(&self, model: &Model, starts: &Starts) -> Vec<f64> {
-        let mut out = vec![0.0; self.len()];
+        self.residual_counted(model, starts).0
+    }
+
+    /// The same, and what it took, in rows ([`Work`]).
+    pub(crate) fn residual_counted(&self, model: &Model, starts: &Starts) -> (Vec<f64>, u64) {
+        let (mut out, mut rows) = (vec![0.0; self.len()], 0);
         for (index, record) in self.records.iter().enumerate() {
             if let (Some(capture), Some(range)) = (&record.capture, self.tail(index)) {
                 let left = capture.residual(model, &capture_drive(record, starts.trim));
                 out[range].copy_from_slice(&left);
                 continue;
             }
-            let (shown, periods) = simulate_counted(model, record, &starts.of(index));
-            self.work.add(model, record, periods);
+            let (shown, ran) = simulate_counted(model, record, &starts.of(index));
+            rows += self.work.add(ran);
             for segment in &record.segments {
                 let first = if record.settled {
                     segment.start
@@ -328,7 +333,7 @@ impl Problem {
         if let Some(last) = out.last_mut() {
             *last = -starts.trim / self.duty_accuracy();
         }
-        out
+        (out, rows)
     }
 
     /// Number of values that count.

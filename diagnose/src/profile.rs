@@ -74,9 +74,12 @@ impl Profile {
 }
 
 /// Profiles of all parameters of the best explanation. The intervals allow for the accuracy of the plant too. Where another value fits better than
-/// that of the explanation, its fit had not come to its end: it goes on from there.
+/// that of the explanation, its fit had not come to its end: it goes on from there. Behind the end of the budget they are [`parabolas`].
 #[must_use]
 pub fn profiles(problem: &Problem, attribution: &mut Attribution, say: Listener<'_>) -> Vec<Profile> {
+    if attribution.best.is_none() || !problem.work.may_seek_intervals() {
+        return parabolas(problem, attribution);
+    }
     let mut found = of_best(problem, attribution, say);
     for _ in 0..ENDS {
         let (Some(best), Some(lower)) = (&attribution.best, found.1) else {
@@ -86,6 +89,9 @@ pub fn profiles(problem: &Problem, attribution: &mut Attribution, say: Listener<
             .fitter(problem)
             .from(&best.causes, &lower.values, &lower.state);
         attribution.best = Some(if fit.state.chi2 < lower.state.chi2 { fit } else { lower });
+        if !problem.work.may_seek_intervals() {
+            return parabolas(problem, attribution);
+        }
         found = of_best(problem, attribution, say);
     }
     found.0

@@ -23,7 +23,7 @@ pub(crate) mod lanes;
 
 use serde::{Deserialize, Serialize};
 
-use self::few::Few;
+use self::few::{Few, LAGGED};
 use crate::catalogue;
 use crate::entry::Way;
 use crate::lag;
@@ -117,15 +117,14 @@ fn is_affine(p: &Parameters, rate: f64) -> bool {
     is_fast && is_linear && p.source.ripple == 0.0
 }
 
-/// Steps of the integrator in a switching period without a load: what its simulation takes time for. 0 where a matrix stands for all of
-/// them, or the circuit is simple enough to need none.
+/// Steps in a switching period without a load: what its simulation takes time for. 0 where the circuit is simple enough to need none.
 #[must_use]
 pub fn steps_per_period(p: &Parameters) -> f64 {
     let rate = rate::fastest(p).1;
-    if catalogue::way(p) < Way::Full || is_affine(p, rate) {
-        0.0
-    } else {
-        rate * p.t_sw()
+    match (catalogue::way(p) < Way::Full, is_affine(p, rate)) {
+        (true, _) => 0.0,
+        (false, true) => affine::FEWER * rate * p.t_sw(),
+        (false, false) => rate * p.t_sw(),
     }
 }
 
@@ -212,10 +211,7 @@ impl Full {
             };
         }
         if let Some(few) = Few::new(self, path, load) {
-            return match few.is_whole() {
-                true => self.advance_first(x, path, load, span, track, |x, _| few.algebra::<true>(x)),
-                false => self.advance_first(x, path, load, span, track, |x, _| few.algebra::<false>(x)),
-            };
+            return self.advance_few(&few, x, path, load, span, track);
         }
         if self.is_wired {
             let algebra = |x: &[f64; WIRED], t: f64| self.algebra(x, path, load, t);
@@ -231,7 +227,37 @@ impl Full {
         }
     }
 
-    /// [`Full::advance`] where the states behind the first `N` stand still, and `algebra` gives what follows from states and time.
+    /// [`Full::advance`] of a circuit without other states than those of [`Few`].
+    fn advance_few(
+        &self,
+        few: &Few<'_>,
+        x: &mut States,
+        path: &Path,
+        load: &Load,
+        span: (f64, f64),
+        track: &mut Track,
+    ) -> f64 {
+        let is_bent = self.linear.contains(&None);
+        macro_rules! advance {
+            ($n:expr, $whole:expr, $bent:expr) => {
+                self.advance_first(x, path, load, span, track, |x: &[f64; $n], _| {
+                    few.algebra::<{ $n }, $whole, $bent>(x)
+                })
+            };
+        }
+        match (self.has_lag, few.is_whole(), is_bent) {
+            (false, true, false) => advance!(FEW, true, false),
+            (false, true, true) => advance!(FEW, true, true),
+            (false, false, false) => advance!(FEW, false, false),
+            (false, false, true) => advance!(FEW, false, true),
+            (true, true, false) => advance!(LAGGED, true, false),
+            (true, true, true) => advance!(LAGGED, true, true),
+            (true, false, false) => advance!(LAGGED, false, false),
+            (true, false, true) => advance!(LAGGED, false, true),
+        }
+    }
+
+    /// [`Full::advance`] where the states behind the first `N` stand still (for `N` of [`LAGGED`] see [`place`]), and `algebra` gives what follows from states and time.
     #[inline(always)]
     fn advance_first<const N: usize>(
         &self,
@@ -246,12 +272,18 @@ impl Full {
         let mut x = first::<N>(states);
         // a load step changes this rate, so it is not part of `rate`
         let far = rate::of_load(&self.p, load);
+        let mut before = algebra(&x, t);
+        let rate = match self.linear {
+            [Some(_), Some(_)] => self.rate,
+            // that of the worst current and voltage is known to be enough
+            _ => rate::fastest_near(&self.p, &before.signals, h).min(self.rate),
+        };
         // at least one step: an interval of length 0 would be 0 / 0
-        let count = (h * self.rate.max(far)).ceil().max(1.0);
+        let count = (h * rate.max(far)).ceil().max(1.0);
+        track.steps += count as u64;
         let step = h / count;
         let has_lags = self.low_pass != [0.0; 4];
         let whole = has_lags.then(|| lag::of_sensors(step, &self.low_pass));
-        let mut before = algebra(&x, t);
         extend(track, &before.signals, path);
         let mut used = 0.0;
         for _ in 0..count as u64 {
@@ -288,7 +320,9 @@ impl Full {
                 x[I_L] = 0.0;
             }
             extend(track, &after.signals, path);
-            states[..N].copy_from_slice(&x);
+            for (n, value) in x.iter().enumerate() {
+                states[place::<N>(n)] = *value;
+            }
             if crossed {
                 return used.min(h);
             }
@@ -368,7 +402,13 @@ fn left<const N: usize>(a: &Algebra<N>, path: &Path) -> f64 {
 /// The states that change.
 #[inline(always)]
 fn first<const N: usize>(x: &States) -> [f64; N] {
-    std::array::from_fn(|n| x[n])
+    std::array::from_fn(|n| x[place::<N>(n)])
+}
+
+/// Where the state number `n` of `N` stands among all. A load that lags without a cable between has its current behind the first two.
+#[inline(always)]
+fn place<const N: usize>(n: usize) -> usize {
+    if N == LAGGED && n == V_C + 1 { I_CPL } else { n }
 }
 
 #[inline(always)]

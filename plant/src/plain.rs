@@ -76,6 +76,8 @@ pub(crate) struct Track {
     pub i_min: f64,
     pub i_max: f64,
     pub discontinuous: bool,
+    /// Steps of an integrator.
+    pub steps: u64,
 }
 
 impl Track {
@@ -86,6 +88,7 @@ impl Track {
             i_min: i,
             i_max: i,
             discontinuous: false,
+            steps: 0,
         }
     }
 

@@ -34,6 +34,8 @@ pub struct Plant {
     /// How it has to be computed.
     pub(crate) way: Way,
     pub(crate) state: PlantState,
+    /// Steps of an integrator since it was made.
+    steps: u64,
 }
 
 /// Everything about a plant that changes; restoring it continues to the bit.
@@ -75,6 +77,7 @@ impl Plant {
             sensing,
             parameters: p.clone(),
             longer: 0.0,
+            steps: 0,
             state: PlantState {
                 x: States::default(),
                 path: Path::OPEN,
@@ -101,6 +104,13 @@ impl Plant {
     #[must_use]
     pub fn t_sample(&self) -> f64 {
         self.t_sw
+    }
+
+    /// Steps that an integrator has taken since the plant was made: what its simulation took time for, beside its periods. A circuit of inductor and
+    /// capacitor alone needs none.
+    #[must_use]
+    pub fn steps_taken(&self) -> u64 {
+        self.steps
     }
 
     /// The latest sample.
@@ -316,6 +326,7 @@ impl Plant {
     /// Lets the sensors look and stores the sample.
     #[inline(always)]
     pub(crate) fn finish(&mut self, signals: Signals, track: Track) -> Sample {
+        self.steps += track.steps;
         let measured = match self.sensing.ideal {
             true => signals,
             false => {

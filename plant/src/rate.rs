@@ -1,8 +1,8 @@
 //! How short the steps of the full circuit are: a share of its fastest time constant.
 
-use crate::effects::{dcr, derating};
+use crate::effects::{dcr, derating, saturation};
 use crate::parameters::Parameters;
-use crate::signals::Load;
+use crate::signals::{Load, Signals};
 
 /// Steps per time constant: of the LC filter, and of everything else.
 // a step leaves about (h / tau)^5 / 120: 3e-9 of the filter's swing, 8e-6 of a fast transient. With these the
@@ -17,16 +17,32 @@ pub(crate) fn has_c_in(p: &Parameters) -> bool {
     p.source.c_in > 0.0 && (p.source.resistance > 0.0 || p.source.inductance > 0.0)
 }
 
+/// What is left of inductance and output capacitance, H and F, and whether the fall of the inductance may be passed.
+struct Left {
+    l: f64,
+    c: f64,
+    falls: bool,
+}
+
+impl Left {
+    /// The least that saturation and derating can leave, whatever current and voltage are.
+    fn least(p: &Parameters) -> Self {
+        Left {
+            l: p.converter.inductance * (1.0 - p.inductor.saturation),
+            c: p.converter.capacitance * derating::least(p),
+            falls: true,
+        }
+    }
+}
+
 /// The rates of the parts of the circuit without a load: the key of the part, 1/s, and steps per time constant.
-fn rates(p: &Parameters, mut ask: impl FnMut(&'static str, f64, f64)) {
-    // the least that saturation and derating can leave, so that the step need not follow current and voltage
-    let l = p.converter.inductance * (1.0 - p.inductor.saturation);
-    let c = p.converter.capacitance * derating::least(p);
+fn rates(p: &Parameters, left: &Left, mut ask: impl FnMut(&'static str, f64, f64)) {
+    let Left { l, c, falls } = *left;
     let r = dcr::in_series(&p.inductor)
         + p.switch.r_ds_on.max(p.switch.r_ds_on_low).max(p.switch.r_d)
         + p.source.resistance;
     ask("converter.inductance", 1.0 / (l * c).sqrt(), FILTER_STEP);
-    if p.inductor.saturation > 0.0 && p.inductor.steepness > 1.0 {
+    if falls && p.inductor.saturation > 0.0 && p.inductor.steepness > 1.0 {
         // a step each time the current passes the width of the fall, at the slope that it has in the middle: longer ones jump over it
         let middle = p.converter.inductance * (1.0 - 0.5 * p.inductor.saturation);
         let rate = p.converter.v_in / middle * p.inductor.steepness / p.inductor.i_sat;
@@ -67,8 +83,12 @@ fn rates(p: &Parameters, mut ask: impl FnMut(&'static str, f64, f64)) {
 
 /// Steps per second that the parts of the circuit ask for without a load, and the key of the part that asks for most.
 pub(crate) fn fastest(p: &Parameters) -> (&'static str, f64) {
+    fastest_of(p, &Left::least(p))
+}
+
+fn fastest_of(p: &Parameters, left: &Left) -> (&'static str, f64) {
     let mut fastest = ("", f64::NEG_INFINITY);
-    rates(p, |key, rate, step| {
+    rates(p, left, |key, rate, step| {
         if fastest.0.is_empty() || rate / step > fastest.1 {
             fastest = (key, rate / step);
         }
@@ -76,10 +96,33 @@ pub(crate) fn fastest(p: &Parameters) -> (&'static str, f64) {
     fastest
 }
 
+/// Share of what an inductor can lose, below which it is as good as linear: its fall need not be resolved.
+const HARDLY: f64 = 0.01;
+
+/// [`fastest`] over the next `h` seconds, where current and voltage are known to begin with: a curve that could leave a tenth, and leaves nine
+/// tenths there, asks for a third of the steps.
+pub(crate) fn fastest_near(p: &Parameters, at: &Signals, h: f64) -> f64 {
+    let least = Left::least(p);
+    let (inductance, capacitance) = (p.converter.inductance, p.converter.capacitance);
+    // no path puts more on the inductor than source and output together; what is left of it where that leads says how far it leads
+    let across = p.converter.v_in.abs().max(at.v_in.abs()) + at.v_out.abs();
+    let left_at = |i: f64| inductance * saturation::relative_inductance(&p.inductor, i);
+    let far = |l: f64| at.i_l.abs() + h * across / l;
+    let i = far(left_at(far(left_at(at.i_l.abs()))));
+    let c_at = |v: f64| capacitance * derating::relative_capacitance(&p.capacitor, v);
+    let v = at.v_out.abs() + h * (i + at.i_out.abs()) / c_at(at.v_out.abs());
+    let left = Left {
+        l: left_at(i).max(least.l),
+        c: c_at(v).max(least.c),
+        falls: saturation::relative_inductance(&p.inductor, i) < 1.0 - HARDLY * p.inductor.saturation,
+    };
+    fastest_of(p, &left).1
+}
+
 /// The sum of the rates of the parts without a load, 1/s.
 pub(crate) fn total(p: &Parameters) -> f64 {
     let mut total = 0.0;
-    rates(p, |_, rate, _| total += rate);
+    rates(p, &Left::least(p), |_, rate, _| total += rate);
     total
 }
 

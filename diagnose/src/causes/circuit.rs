@@ -83,8 +83,9 @@ pub(super) const ESL: Cause = Cause {
     kind: Kind::Part,
     forms: &[form(
         "series inductance of the output capacitor",
-        // the plant's bound, and the upper end of its typical range: no share of the converter's size
-        &[knob("esl", &["capacitor.esl"], Reach::Plain(0.0, 1e-5, 2e-7))],
+        // the output jumps by esl / L of the switched voltage: a nanohenry is much beside a third of a microhenry. No capacitor with its
+        // leads has half of the inductor's; 10 uH is the plant's bound
+        &[knob("esl", &["capacitor.esl"], Reach::BesideInductor(0.5, 1e-4, 1e-5))],
     )],
 };
 

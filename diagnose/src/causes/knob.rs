@@ -15,6 +15,8 @@ pub struct Bases {
     pub t_sw: f64,
     /// Frequency at which the output filter of a buck of these parts swings, Hz.
     pub filter: f64,
+    /// Inductance of the converter, H.
+    pub inductance: f64,
 }
 
 /// How a parameter may move: lowest, highest, and the step that counts as one.
@@ -31,6 +33,8 @@ pub(crate) enum Reach {
     Capacitance(f64, f64, f64),
     /// In units of t_sw v / i.
     Inductance(f64, f64, f64),
+    /// In shares of the converter's inductance, which divides the switched voltage with it: highest and step; and highest in henry.
+    BesideInductor(f64, f64, f64),
     /// In units of i / v.
     Conductance(f64, f64),
     /// In units of v_in.
@@ -174,6 +178,9 @@ impl Knob {
             }
             Reach::Capacitance(low, high, step) => by(bases.t_sw * bases.i / bases.v, low, high, step),
             Reach::Inductance(low, high, step) => by(bases.t_sw * bases.v / bases.i, low, high, step),
+            Reach::BesideInductor(high, step, most) => {
+                [0.0, most.min(high * bases.inductance), step * bases.inductance]
+            }
             Reach::Conductance(high, step) => by(bases.i / bases.v, 0.0, high, step),
             Reach::Source(low, high, step) => by(bases.v_in, low, high, step),
             Reach::Voltage(low, high, step) => by(bases.v, low, high, step),

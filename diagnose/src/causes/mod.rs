@@ -292,12 +292,35 @@ mod tests {
                 v_in: 48.0,
                 t_sw: 5e-6,
                 filter,
+                inductance: 22e-6,
             };
             let all = candidates(&model, &bases);
             let ripple = all.iter().find(|one| one.cause.id == "input_ripple").unwrap();
             ripple.ranges[1][1]
         };
         assert_eq!([highest(1.9e3), highest(3e4)], [2e3, 1.5e4]);
+    }
+
+    #[test]
+    fn nanohenries_beside_a_small_inductor_are_an_effect_and_beside_a_large_one_none() {
+        let is_nothing = |inductance: f64, esl: f64| {
+            let text =
+                format!("[converter]\nv_in = 5.0\ninductance = {inductance}\ncapacitance = 200e-6\nf_sw = 1e6\n");
+            let model = Model::new(&plant::Parameters::from_toml("plant.toml".as_ref(), &text).unwrap());
+            let bases = Bases {
+                v: 1.0,
+                i: 10.0,
+                v_in: 5.0,
+                t_sw: 1e-6,
+                filter: 2e4,
+                inductance,
+            };
+            let all = candidates(&model, &bases);
+            let found = all.iter().find(|one| one.cause.id == "esl").unwrap();
+            found.is_nothing(&[esl])
+        };
+        // 1 nH and .33 uH: 15 mV of 5 V at each edge; 2 mH: 2.5 uV
+        assert_eq!([is_nothing(0.33e-6, 1e-9), is_nothing(2e-3, 1e-9)], [false, true]);
     }
 
     #[test]
@@ -310,6 +333,7 @@ mod tests {
             v_in: 48.0,
             t_sw: 5e-6,
             filter: 1.9e3,
+            inductance: 22e-6,
         };
         let candidates = candidates(&model, &bases);
         let left = |key: &str| {

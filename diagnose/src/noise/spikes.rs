@@ -27,23 +27,31 @@ pub fn outliers(problem: &Problem, residual: &[f64]) -> Vec<Outlier> {
         for n in 0..CHANNELS {
             let left = channel(problem, residual, index, n);
             let raw: Vec<f64> = record.measured[n].iter().map(|v| v / problem.sigma[n]).collect();
-            let (wild, wild_raw) = (wild(&left), wild(&raw));
-            for row in 2..record.rows().saturating_sub(2) {
-                // both: what leaps in the signal alone the model explains, what leaps in the residual alone it brings
-                let alone = leaps(&left, row) && (leaps(&raw, row) || leaps_off_curve(&raw, row));
-                let near_others = leaps_over(&left, &wild, row) && leaps_over(&raw, &wild_raw, row);
-                let beside_bend = leaps_beside_bend(&left, &raw, row);
-                if alone || near_others || beside_bend || leaps_in_a_pair(&left, row) && leaps_in_a_pair(&raw, row) {
-                    found.push(Outlier {
-                        record: index,
-                        row,
-                        channel: n,
-                    });
-                }
-            }
+            let rows = wild_rows(&left, &raw).into_iter();
+            found.extend(rows.map(|row| Outlier {
+                record: index,
+                row,
+                channel: n,
+            }));
         }
     }
     found
+}
+
+/// Rows that leap out of what a model leaves, and out of what was `raw`ly measured: what leaps in the signal alone the model explains, what leaps
+/// in the residual alone it brings. Where the signal swings as far as it leaps, the model itself is asked whether it brings the leap.
+fn wild_rows(left: &[f64], raw: &[f64]) -> Vec<usize> {
+    let shown: Vec<f64> = raw.iter().zip(left).map(|(raw, left)| raw - left).collect();
+    let (wild_left, wild_raw) = (wild(left), wild(raw));
+    let is_wild = |row: &usize| {
+        let row = *row;
+        let is_brought = || brings(&shown, left, &wild_left, row);
+        leaps(left, row) && (leaps(raw, row) || leaps_off_curve(raw, row))
+            || leaps_over(left, &wild_left, row) && (leaps_over(raw, &wild_raw, row) || !is_brought())
+            || leaps_beside_bend(left, &shown, row)
+            || leaps_in_a_pair(left, row) && (leaps_in_a_pair(raw, row) || !is_brought())
+    };
+    (2..left.len().saturating_sub(2)).filter(is_wild).collect()
 }
 
 /// Whether a row lies apart from its neighbours, beyond their own spread.
@@ -153,16 +161,25 @@ const BENDS: f64 = 0.25;
 
 /// Whether a row leaps where the duty or the load steps: there the signal bends as sharply as it leaps, and the model alone tells the two apart. What
 /// it shows is the signal without the residual.
-fn leaps_beside_bend(left: &[f64], raw: &[f64], row: usize) -> bool {
-    let [before, after] = [row - 1, row + 1].map(|other| raw[row] - raw[other]);
-    let shown: Vec<f64> = raw.iter().zip(left).map(|(raw, left)| raw - left).collect();
+fn leaps_beside_bend(left: &[f64], shown: &[f64], row: usize) -> bool {
+    let raw = |row: usize| shown[row] + left[row];
+    let [before, after] = [row - 1, row + 1].map(|other| raw(row) - raw(other));
     let is_single = |off: f64| {
         before * after > 0.0
             && before.abs().min(after.abs()) > 0.5 * off
             && is_off_most(left, row, off)
-            && off_curve(&shown, row).is_some_and(|bend| bend < BENDS * off)
+            && off_curve(shown, row).is_some_and(|bend| bend < BENDS * off)
     };
     leaps(left, row) && off_curve(left, row).is_some_and(|off| off > 2.0 * FAR && is_single(off))
+}
+
+/// Whether the model may bring what leaps in the residual: it bends there, or near it, by more than a share of the leap.
+fn brings(shown: &[f64], left: &[f64], wild: &[bool], row: usize) -> bool {
+    let near = row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(left.len());
+    let calm = near.clone().filter(|other| !wild[*other]).map(|other| left[other]);
+    let leap = (left[row] - median(calm.filter(|v| v.is_finite()))).abs();
+    let bends = |other: usize| off_curve(shown, other).is_some_and(|bend| bend > BENDS * leap);
+    !leap.is_finite() || near.into_iter().any(bends)
 }
 
 /// Outliers that one sentence lists; a reader looks at no more.
@@ -189,7 +206,7 @@ pub fn spikes(problem: &Problem, outliers: &[Outlier]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::super::tests::normal;
-    use super::{leaps_beside_bend, leaps_in_a_pair, leaps_off_curve, leaps_over, wild};
+    use super::{leaps_beside_bend, leaps_in_a_pair, leaps_off_curve, leaps_over, wild, wild_rows};
 
     #[test]
     fn a_spike_on_a_swing_is_seen_and_a_step_or_a_swing_is_none() {
@@ -219,9 +236,8 @@ mod tests {
         let mut left: Vec<f64> = (0..120).map(|_| normal(&mut state)).collect();
         left[61] += 110.0;
         let seen = |left: &[f64], shown: &[f64]| {
-            let raw: Vec<f64> = shown.iter().zip(left).map(|(a, b)| a + b).collect();
             (2..118)
-                .filter(|row| leaps_beside_bend(left, &raw, *row))
+                .filter(|row| leaps_beside_bend(left, shown, *row))
                 .collect::<Vec<usize>>()
         };
         assert_eq!(seen(&left, &shown), [61]);
@@ -271,6 +287,28 @@ mod tests {
         assert_eq!(seen(&spiked), [60, 62, 65, 120, 123]);
         assert_eq!(seen(&quiet), [] as [usize; 0]);
         assert_eq!(seen(&moved), [] as [usize; 0]);
+    }
+
+    #[test]
+    fn spikes_near_each_other_on_a_swing_as_large_as_they_are_seen_and_what_the_model_brings_is_none() {
+        let mut state = 13;
+        // 4 A of ringing, spikes of 11 A, noise of 40 mA
+        let shown: Vec<f64> = (0..200)
+            .map(|n| 100.0 * (f64::from(n) * 0.5).sin() * (f64::from(n) * -0.01).exp())
+            .collect();
+        let mut left: Vec<f64> = (0..200).map(|_| normal(&mut state)).collect();
+        for (row, by) in [(40, -280.0), (42, -280.0), (80, 280.0), (81, -280.0)] {
+            left[row] += by;
+        }
+        let raw = |left: &[f64], shown: &[f64]| -> Vec<f64> { left.iter().zip(shown).map(|(a, b)| a + b).collect() };
+        assert_eq!(wild_rows(&left, &raw(&left, &shown)), [40, 42, 80, 81]);
+        // a model that kicks for two rows where the converter does not
+        let mut kicked = shown.clone();
+        (kicked[120], kicked[121]) = (kicked[120] + 280.0, kicked[121] - 280.0);
+        let own: Vec<f64> = (shown.iter().zip(&kicked))
+            .map(|(a, b)| a - b + normal(&mut state))
+            .collect();
+        assert_eq!(wild_rows(&own, &raw(&own, &kicked)), [] as [usize; 0]);
     }
 
     #[test]

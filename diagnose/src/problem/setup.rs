@@ -61,6 +61,7 @@ pub(super) fn bases(records: &[Record], base: &Model) -> Bases {
         v_in,
         t_sw: base.plant.t_sw(),
         filter: base.plant.converter.f_sw / ideal.swing(),
+        inductance: base.plant.converter.inductance,
     }
 }
 

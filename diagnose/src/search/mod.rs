@@ -57,6 +57,9 @@ const MOST_EXCHANGED: usize = 3;
 /// found must not hang on them.
 const AT_ONCE: usize = 2;
 
+/// Looks between two looks at the budget. A look at a counter, of which many steps are tried, costs as much as a fit. A convention.
+const LOOKS_AT_ONCE: usize = 8;
+
 /// Fits sets of causes.
 pub(crate) struct Searcher<'a> {
     /// Fits one set.
@@ -189,6 +192,7 @@ impl Searcher<'_> {
         };
         let mut best = self.polished(first);
         let mut before = null.chi2;
+        self.fitter.problem.work.leaves(self.share_left(&best));
         while best.causes.len() < self.fitter.problem.work.most_causes()
             && best.values.len() < most
             && !self.is_hopeless(&best, before)
@@ -202,6 +206,9 @@ impl Searcher<'_> {
                 && self.fitter.problem.work.goes_on()
             {
                 for leader in self.distinct(&leaders).into_iter().skip(1).take(LEADERS) {
+                    if !self.fitter.problem.work.goes_on() {
+                        break;
+                    }
                     let stage = format!("{} and another", self.names(leader));
                     larger.extend(self.forward(leader, LOOKED_AT_BY_LEADERS, &stage));
                 }
@@ -220,6 +227,7 @@ impl Searcher<'_> {
             if self.structure(&best) > 0.0 || self.asks_for_edges(&best.state) {
                 best = self.reformed(self.swapped(best));
             }
+            self.fitter.problem.work.leaves(self.share_left(&best));
             leaders = larger;
         }
         if !self.is_hopeless(&best, before) {
@@ -282,7 +290,13 @@ impl Searcher<'_> {
     fn forward(&self, best: &Fit, count: usize, stage: &str) -> Vec<Fit> {
         let columns = self.sensitivities(&best.causes, &best.state);
         let set = Set::of(best, &columns);
-        let looks = self.looks(&set, &self.others(&best.causes), &best.state);
+        let mut looks = Vec::new();
+        for some in self.others(&best.causes).chunks(LOOKS_AT_ONCE) {
+            if !looks.is_empty() && !self.fitter.problem.work.goes_on() {
+                break;
+            }
+            looks.extend(self.looks(&set, some, &best.state));
+        }
         // a nonlinear fit may gain three times what it promises at first order; less is not worth a fit
         let least = 0.3 * threshold(1, 1.0);
         let looks = looks.into_iter().filter(|(gain, _)| *gain > least).collect();

@@ -171,7 +171,7 @@ impl Searcher<'_> {
         // one that has none was looked for where the other causes were then: it moves with them, by shares of a count
         let mut step = 0.5 * COUNT_STEP;
         for _ in 0..MOST_COUNTS {
-            if is_whole(&best) || step < COUNT_STEP / 20.0 {
+            if is_whole(&best) || step < COUNT_STEP / 20.0 || !self.fitter.problem.work.goes_on() {
                 break;
             }
             let at = best.values[place].recip();

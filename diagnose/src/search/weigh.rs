@@ -66,6 +66,13 @@ impl Searcher<'_> {
         fit.causes.len() > 1 && (leaves_much || adds_little)
     }
 
+    /// Share of the squares above the noise that a fit leaves; nothing of what is no more than noise once again.
+    pub(super) fn share_left(&self, fit: &Fit) -> f64 {
+        let count = self.fitter.problem.count() as f64;
+        let above = |chi2: f64| chi2 - 2.0 * count;
+        above(fit.state.chi2).max(0.0) / above(self.fitter.null.chi2).max(f64::MIN_POSITIVE)
+    }
+
     /// Whether all candidates together explain too little of what a state leaves for any few of them to explain it; places of the residual that
     /// are `aside` have been left out of what is to be explained.
     pub(crate) fn is_out_of_reach(&self, state: &State, aside: &(dyn Fn(usize) -> bool + Sync)) -> bool {

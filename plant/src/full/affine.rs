@@ -31,7 +31,9 @@ type Matrix<const N: usize> = [[f64; N]; N];
 
 /// Steps here over steps of the method of Runge and Kutta.
 // only the extremes within a step and `r` ask for steps: a whole time constant leaves an extreme 2e-5 of the ringing
-const FEWER: f64 = 0.25;
+pub(super) const FEWER: f64 = 0.25;
+/// Making a matrix takes as long as so many steps of Runge and Kutta.
+const MADE: u64 = 10;
 /// Steps of an interval at most; just above the fold constant power carries away at any rate.
 const MOST: f64 = 1e6;
 /// How far the voltage may go from the tangent's, relative.
@@ -306,6 +308,7 @@ impl Full {
             let circuit = Circuit::new(self, &x, path, load, t);
             let asked = self.steps(&circuit, &x, path, far, h - used);
             let mut count = ((h - used) * asked).ceil().clamp(1.0, MOST) as u64;
+            track.steps += MADE + count;
             let length = (h - used) / count as f64;
             let total = self.total + far * rate::OTHER_STEP + circuit.tangent.fastest();
             let step = Step::new(&circuit, length, total);

@@ -1,12 +1,17 @@
-//! The circuit of inductor and output capacitor with an ESR, where no part changes with current, voltage or time: what does not
-//! depend on the states is computed once for a path and a load.
+//! The circuit of inductor and output capacitor with an ESR, and a load whose constant power may lag, without other states and a source that does
+//! not ripple: what does not depend on the states is computed once for a path and a load.
 //!
 //! Invariant: the bits of [`Full::algebra`]. Every sum and product below is one of it, in its order; what is left out is a product
 //! with 1 or a sum with 0.
 
-use super::{Algebra, FEW, Full, I_L, Path, V_C};
-use crate::effects::dcr;
+use super::{Algebra, Full, I_L, Path, V_C};
+use crate::effects::{dcr, derating, saturation};
 use crate::signals::{Load, Signals};
+
+/// Where the current of a constant power that lags stands among the states here.
+const LAGS: usize = V_C + 1;
+/// States with it.
+pub(super) const LAGGED: usize = LAGS + 1;
 
 /// What a path and a load make of the circuit.
 #[derive(Debug, Clone, Copy)]
@@ -29,28 +34,29 @@ pub(super) struct Few<'a> {
     esr_fixed: f64,
     /// `4 slope esr P`
     four: f64,
+    /// Of parts that do not change.
     per_l: f64,
     per_c: f64,
 }
 
 impl<'a> Few<'a> {
-    /// Nothing if a part changes, or there are other states.
+    /// Nothing if there are other states, or the source ripples, or a current that changes the inductance acts on the output at once.
     #[inline]
     pub fn new(full: &'a Full, path: &Path, load: &'a Load) -> Option<Self> {
         let p = &full.p;
-        let [Some(per_l), Some(per_c)] = full.linear else {
-            return None;
-        };
-        if full.has_many || p.source.ripple != 0.0 {
+        let [per_l, per_c] = full.linear;
+        let acts_at_once = per_l.is_none() && p.capacitor.esl != 0.0;
+        if full.has_cable || full.has_c_in || p.source.ripple != 0.0 || acts_at_once {
             return None;
         }
         let (v_source, r_th) = (p.converter.v_in, p.source.resistance);
         let r = path.r + path.share * r_th + dcr::in_series(&p.inductor) + full.apart(path, load);
         let (core, esr) = (p.inductor.core_conductance, p.capacitor.esr);
         let shrunk = if core == 0.0 { 1.0 } else { 1.0 / (1.0 + r * core) };
+        // of an inductance that changes nothing acts at once: `esl` is 0
         let reflected = match path.open {
             true => 0.0,
-            false => path.give * (esr * core + p.capacitor.esl * per_l) * shrunk,
+            false => path.give * (esr * core + p.capacitor.esl * per_l.unwrap_or(0.0)) * shrunk,
         };
         let mut slope = 1.0 + path.give * reflected;
         slope += esr * load.conductance;
@@ -70,8 +76,8 @@ impl<'a> Few<'a> {
             slope,
             esr_fixed: esr * load.current,
             four: 4.0 * slope * esr * load.power,
-            per_l,
-            per_c,
+            per_l: per_l.unwrap_or(f64::NAN),
+            per_c: per_c.unwrap_or(f64::NAN),
         })
     }
 
@@ -81,9 +87,10 @@ impl<'a> Few<'a> {
         !self.open && self.give == 1.0 && self.core == 0.0 && self.reflected == 0.0 && self.share_r == 0.0
     }
 
-    /// [`Full::algebra`]; `WHOLE` as [`Few::is_whole`] says.
+    /// [`Full::algebra`] of `N` states, of which the third is the lagging current if it is there; `WHOLE` as [`Few::is_whole`] says, `BENT` if a part
+    /// changes.
     #[inline(always)]
-    pub fn algebra<const WHOLE: bool>(&self, x: &[f64; FEW]) -> Algebra<FEW> {
+    pub fn algebra<const N: usize, const WHOLE: bool, const BENT: bool>(&self, x: &[f64; N]) -> Algebra<N> {
         let i_l = if !WHOLE && self.open { 0.0 } else { x[I_L] };
         let drive = self.drive - self.r * i_l;
         let given = if WHOLE { i_l } else { self.give * i_l };
@@ -91,8 +98,10 @@ impl<'a> Few<'a> {
         if !WHOLE {
             right += self.reflected * drive;
         }
-        right -= self.esr_fixed;
-        let (v_out, i_out) = self.output(right);
+        let (v_out, i_out) = match N == LAGGED {
+            true => self.output_beside(right, x[LAGS]),
+            false => self.output(right - self.esr_fixed),
+        };
         let v_l = match WHOLE {
             true => drive - v_out,
             false if self.open => 0.0,
@@ -100,6 +109,17 @@ impl<'a> Few<'a> {
         };
         let i_b = if WHOLE { i_l } else { i_l + self.core * v_l };
         let received = if WHOLE { i_b } else { self.give * i_b };
+        let [per_l, per_c] = match BENT {
+            true => self.bent(x[I_L], x[V_C]),
+            false => [self.per_l, self.per_c],
+        };
+        let mut slopes = [0.0; N];
+        slopes[I_L] = v_l * per_l;
+        slopes[V_C] = (received - i_out) * per_c;
+        if N == LAGGED {
+            let lag = self.full.p.load.cpl_time_constant;
+            slopes[LAGS] = (self.full.constant_power(self.load, v_out) - x[LAGS]) / lag;
+        }
         Algebra {
             signals: Signals {
                 v_out,
@@ -113,8 +133,29 @@ impl<'a> Few<'a> {
             },
             v_l,
             v_source: self.v_source,
-            slopes: [v_l * self.per_l, (received - i_out) * self.per_c],
+            slopes,
         }
+    }
+
+    /// 1 / L and 1 / C, at least one of which changes.
+    #[inline(always)]
+    fn bent(&self, i: f64, v: f64) -> [f64; 2] {
+        let p = &self.full.p;
+        let [per_l, per_c] = self.full.linear;
+        [
+            per_l.unwrap_or_else(|| 1.0 / (p.converter.inductance * saturation::relative_inductance(&p.inductor, i))),
+            per_c.unwrap_or_else(|| 1.0 / (p.converter.capacitance * derating::relative_capacitance(&p.capacitor, v))),
+        ]
+    }
+
+    /// Output voltage and current beside a constant power that lags.
+    #[inline(always)]
+    fn output_beside(&self, right: f64, lagging: f64) -> (f64, f64) {
+        let load = self.load;
+        let fixed = load.current + lagging;
+        let right = right - self.esr * fixed;
+        let v = if self.slope == 1.0 { right } else { right / self.slope };
+        (v, load.conductance * v + fixed)
     }
 
     /// Output voltage and current.

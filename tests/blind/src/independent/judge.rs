@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::independent::families::SHOWS;
+use crate::independent::intervals::{self, Told};
 use crate::independent::truth::{Family, Truth};
 
 /// A held-out column counts for the gain from this share of reducible error to noise on.
@@ -91,6 +92,9 @@ pub struct Judgement {
     pub seconds: f64,
     /// Shares of the reducible held-out error that the extended model removes.
     pub removed: Vec<f64>,
+    /// Hidden values whose cause was named.
+    #[serde(default)]
+    pub told: Vec<Told>,
 }
 
 /// Ids of a cause and of the sets of ids that it calls its rivals.
@@ -168,6 +172,7 @@ pub fn judge(truth: &Truth, answer: &Answer) -> Judgement {
         false_alarm: truth.family == Family::Healthy && (verdict != "consistent" || !causes.is_empty()) && !refused,
         seconds: answer.seconds,
         removed: removed(truth, diagnosis),
+        told: intervals::told(truth, diagnosis),
     }
 }
 

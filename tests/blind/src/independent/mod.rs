@@ -22,6 +22,7 @@ mod faults;
 mod files;
 mod gates;
 mod instruments;
+mod intervals;
 mod judge;
 mod odd;
 #[cfg(test)]

@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use serde_json::json as value;
 
+use crate::independent::intervals::{self, Told};
 use crate::independent::judge::{Judgement, Outcome};
 use crate::independent::truth::Family;
 use crate::score::{interval, median};
@@ -116,6 +117,17 @@ fn totals(text: &mut String, judged: &[(usize, Judgement)]) {
             median(&removed)
         );
     }
+    let told: Vec<&Told> = all.iter().flat_map(|judgement| &judgement.told).collect();
+    let held = told.iter().filter(|one| one.holds).count();
+    let outside = match intervals::outside(&told) {
+        none if none.is_empty() => none,
+        some => format!("; outside: {some}"),
+    };
+    let _ = writeln!(
+        text,
+        "- 95 % intervals of named causes that hold the hidden value: {}{outside}.",
+        share(held, told.len())
+    );
     let seconds: Vec<f64> = all.iter().map(|judgement| judgement.seconds).collect();
     let worst = seconds.iter().copied().fold(0.0, f64::max);
     let _ = writeln!(

@@ -96,7 +96,7 @@ fn fastest_of(p: &Parameters, left: &Left) -> (&'static str, f64) {
     fastest
 }
 
-/// Share of what an inductor can lose, below which it is as good as linear: its fall need not be resolved.
+/// Share of what an inductor can lose, below which it is as good as linear: its fall need not be resolved. A convention.
 const HARDLY: f64 = 0.01;
 
 /// [`fastest`] over the next `h` seconds, where current and voltage are known to begin with: a curve that could leave a tenth, and leaves nine

@@ -134,3 +134,30 @@ pub(crate) fn of_load(p: &Parameters, load: &Load) -> f64 {
     };
     load.conductance / beside / OTHER_STEP
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{fastest, fastest_near};
+    use crate::parameters::Parameters;
+    use crate::signals::Signals;
+
+    #[test]
+    fn a_part_that_bends_asks_for_the_steps_of_what_is_left_of_it_where_the_current_can_go() {
+        let linear = Parameters::ideal(48.0, 20e-6, 100e-6, 200e3);
+        let mut bent = linear.clone();
+        // a hundredth is left far above i_sat, which would be ten times the steps everywhere
+        (bent.inductor.saturation, bent.inductor.i_sat) = (0.99, 100.0);
+        let at = |i_l: f64| Signals {
+            v_out: 12.0,
+            i_l,
+            i_out: i_l,
+            v_in: 48.0,
+        };
+        let near = |i_l: f64| fastest_near(&bent, &at(i_l), 2.5e-6) / fastest(&linear).1;
+        // 5 A and at most 7.5 A of ripple: L is 1 - .99 (.125)^2 of its own, and the steps grow by the root
+        assert!((1.0..1.02).contains(&near(5.0)), "{}", near(5.0));
+        // at i_sat half of it is left, and less where the current goes on
+        assert!(near(100.0) > 2.0_f64.sqrt(), "{}", near(100.0));
+        assert!((near(1e5) / 10.0 - 1.0).abs() < 1e-3, "{}", near(1e5));
+    }
+}

@@ -180,10 +180,7 @@ pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>
         match record.settled {
             true if driver.repeats(segment.start) => shown[segment.start] = shown[segment.start - 1],
             true => ran.periods += driver.settle(&mut plant, segment.start, start, &mut shown),
-            false => {
-                driver.run(&mut plant, segment, start, &mut shown);
-                ran.periods += segment.len() as u64;
-            }
+            false => ran.periods += driver.run(&mut plant, segment, start, &mut shown),
         }
         ran.steps += plant.steps_taken();
     }
@@ -234,7 +231,8 @@ impl Driver<'_> {
         n.saturating_add_signed(self.whole).min(self.record.rows() - 1)
     }
 
-    fn run(&self, plant: &mut Plant, segment: &Segment, start: &Start, shown: &mut [[f64; CHANNELS]]) {
+    /// Simulates a segment; the periods that it took.
+    fn run(&self, plant: &mut Plant, segment: &Segment, start: &Start, shown: &mut [[f64; CHANNELS]]) -> u64 {
         let (duty, load) = (&self.record.duty, &self.load);
         let first = self.period(segment.start);
         // at the start of a period its own duty is still to be commanded
@@ -242,7 +240,10 @@ impl Driver<'_> {
         // before the record its first duty was held
         let mut history = vec![duty[0]; HISTORY.saturating_sub(given)];
         history.extend_from_slice(&duty[given.saturating_sub(plant.looks_back())..given]);
-        let sample = plant.reset_within(start[0], start[1], &load[first], &history);
+        plant.reset_within(start[0], start[1], &load[first], &history);
+        // before the record its first duty and its first load were there for long
+        let beside = plant.swing_beside(duty[first], &load[first]);
+        let sample = plant.sample();
         plant.draws_more(start[2]);
         // a slow sensor begins where it was, not at the signal of this instant
         plant.shows(std::array::from_fn(|n| self.record.measured[n][segment.start]));
@@ -259,6 +260,7 @@ impl Driver<'_> {
             };
             *place = array(&sample.measured);
         }
+        segment.len() as u64 + u64::from(beside)
     }
 
     /// The load before the sample of row `n`, where a free step is near.

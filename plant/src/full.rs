@@ -18,6 +18,7 @@
 
 mod affine;
 mod algebra;
+pub(crate) mod beside;
 mod few;
 pub(crate) mod lanes;
 

@@ -10,7 +10,7 @@ use crate::effects::duty_delay::{self, Queue};
 use crate::effects::empirical::Correction;
 use crate::effects::{dcr, duty_offset, duty_quantisation, load_setting, minimum_on_time};
 use crate::entry::Way;
-use crate::full::{Full, Path, States};
+use crate::full::{Full, Path, States, beside};
 use crate::gates::{Gate, GateTiming, Gates};
 use crate::legs::Legs;
 use crate::parameters::{Model, Parameters};
@@ -140,17 +140,10 @@ impl Plant {
     /// hold the voltage, delayed sensors show it. Time starts at 0, the noise goes on.
     pub fn reset_at(&mut self, v_out: f64, i_l: f64, load: &Load) -> Sample {
         let drawn = load_setting::drawn(&self.parameters.load, load);
-        let converter = &self.parameters.converter;
-        let duty = converter.topology.duty(converter.v_in, v_out);
-        let give = match converter.model {
-            Model::Averaged => self.legs.averaged(duty).give,
-            Model::Switched => {
-                let on = self.timing.is_on_before(duty, self.parameters.pwm.sampling_phase);
-                self.legs.steady(on).give
-            }
-        };
+        let duty = self.duty_without_losses(v_out);
+        let x = self.initial(v_out, i_l, &drawn);
         let state = &mut self.state;
-        state.x = self.full.initial(v_out, i_l, &drawn, give);
+        state.x = x;
         state.path = Path::OPEN;
         state.time = 0.0;
         state.queue = Queue::filled(duty);
@@ -169,6 +162,24 @@ impl Plant {
         };
         state.memory.refill(array(&signals));
         self.finish(signals, Track::at(i_l, v_out))
+    }
+
+    fn duty_without_losses(&self, v_out: f64) -> f64 {
+        let converter = &self.parameters.converter;
+        converter.topology.duty(converter.v_in, v_out)
+    }
+
+    /// The states of a circuit without ripple around `v_out` V and `i_l` A.
+    pub(crate) fn initial(&self, v_out: f64, i_l: f64, drawn: &Load) -> States {
+        let duty = self.duty_without_losses(v_out);
+        let give = match self.parameters.converter.model {
+            Model::Averaged => self.legs.averaged(duty).give,
+            Model::Switched => {
+                let on = self.timing.is_on_before(duty, self.parameters.pwm.sampling_phase);
+                self.legs.steady(on).give
+            }
+        };
+        self.full.initial(v_out, i_l, drawn, give)
     }
 
     /// [`Plant::reset_at`] in the middle of a run: `commanded` are the duties given before, the latest last. The one in
@@ -196,6 +207,22 @@ impl Plant {
             self.state.gates.plan(&self.timing, self.state.applied);
         }
         sample
+    }
+
+    /// Moves the states behind a reset as those of `rest`, which end in the states `at_rest`, lie beside the ones without ripple.
+    pub(crate) fn swing_as(&mut self, rest: &Sample, at_rest: &States, load: &Load) {
+        let drawn = load_setting::drawn(&self.parameters.load, load);
+        let without_ripple = self.initial(rest.v_out, rest.i_l, &drawn);
+        let [i_out, v_in] = beside::swung(&mut self.state.x, at_rest, &without_ripple);
+        let Sample { v_out, i_l, .. } = self.state.sample;
+        let signals = Signals {
+            v_out,
+            i_l,
+            i_out: rest.i_out + i_out,
+            v_in: rest.v_in + v_in,
+        };
+        self.state.memory.refill(array(&signals));
+        self.finish(signals, Track::at(i_l, v_out));
     }
 
     /// Commanded duties that [`Plant::reset_within`] can make use of.

@@ -114,6 +114,9 @@ const WARM_UP: u32 = 10;
 const BETWEEN: u32 = 40;
 // four times the 9 steps that the slowest point of the tests takes; 5 are too few for discontinuous conduction
 const MOST_NEWTON: usize = 40;
+/// Periods after which a cable or a filter begins without ripple. A convention: five steps of Newton and what is run around them, where a
+/// circuit in continuous conduction takes two.
+const MOST_BESIDE: u32 = 100;
 /// At rest a period moves no state by this share.
 // 0.1 uV at 100 V, a thousandth of what the two integrators differ by (1e-4 V); the tests hold from 1e-13 to 1e-6
 const AT_REST_1: f64 = 1e-9;
@@ -246,6 +249,24 @@ impl Plant {
         }
     }
 
+    /// After [`Plant::reset_within`] under `load`: lets a cable, the capacitor at its end and an input filter swing as they do where the plant
+    /// rests at `duty`, around the output voltage and the inductor's current given. Those two say nothing of the others, which begin without
+    /// ripple else, and ring for a while. A plant without such parts stays as it is, and so does one that does not come to rest. The periods that it
+    /// took.
+    pub fn swing_beside(&mut self, duty: f64, load: &Load) -> u32 {
+        if !self.full.has_states_beside() || self.parameters().source.ripple > 0.0 {
+            return 0;
+        }
+        let began = *self.state();
+        let rest = self.rest_within(duty, load, MOST_BESIDE);
+        let at_rest = self.state().x;
+        self.restore(&began);
+        if rest.rests {
+            self.swing_as(&rest.sample, &at_rest, load);
+        }
+        rest.periods
+    }
+
     fn run(&mut self, periods: u32, duty: f64, load: &Load) -> Sample {
         (0..periods).fold(self.sample(), |_, _| self.step(duty, load))
     }
@@ -351,6 +372,62 @@ mod tests {
                 sample.v_out
             );
         }
+    }
+
+    /// How far the rows behind a reset are from those of a plant that was at rest before, V and A, with what a cable and a filter swing by and
+    /// without.
+    fn off_after_reset(more: &str, phase: f64) -> [f64; 2] {
+        let text = format!(
+            "[converter]\nrectifier = \"synchronous\"\nv_in = 12.0\ninductance = 2e-6\ncapacitance = 47e-6\nf_sw = 300e3\n\
+             [pwm]\nsampling_phase = {phase}\n[inductor]\ndcr = 0.01\n[capacitor]\nesr = 0.004\n{more}"
+        );
+        let parameters = Parameters::from_toml("plant.toml".as_ref(), &text).unwrap();
+        let load = Load::resistor(0.8);
+        let mut before = Plant::new(&parameters).unwrap();
+        before.reset_within(3.5, 4.0, &load, &[0.3; 9]);
+        let start = (0..20_000).fold(before.sample(), |_, _| before.step(0.3, &load));
+        [true, false].map(|swings| {
+            let mut goes_on = before.clone();
+            let mut plant = Plant::new(&parameters).unwrap();
+            plant.reset_within(start.v_out, start.i_l, &load, &[0.3; 9]);
+            if swings {
+                assert!(plant.swing_beside(0.3, &load) > 0);
+            }
+            let off = |a: crate::Sample, b: crate::Sample| {
+                let of = [a.v_out - b.v_out, a.i_l - b.i_l, a.i_out - b.i_out, a.v_in - b.v_in];
+                of.map(f64::abs).into_iter().fold(0.0, f64::max)
+            };
+            let first = if swings { off(start, plant.sample()) } else { 0.0 };
+            (0..40).fold(first, |most, n| {
+                let duty = if n < 20 { 0.3 } else { 0.35 };
+                most.max(off(goes_on.step(duty, &load), plant.step(duty, &load)))
+            })
+        })
+    }
+
+    #[test]
+    fn a_cable_and_an_input_filter_begin_as_they_swing_at_rest() {
+        let cable = "[cable]\ninductance = 60e-9\nresistance = 5e-3\ncapacitance = 22e-6\n";
+        let filter = "[source]\nresistance = 0.02\ninductance = 400e-9\nc_in = 22e-6\nesr_in = 0.005\n";
+        let leads = "[source]\nresistance = 0.05\nc_in = 22e-6\nesr_in = 0.005\n";
+        for more in [cable, filter, leads, &format!("{cable}{filter}")] {
+            for phase in [0.0, 0.4] {
+                let [swinging, without] = off_after_reset(more, phase);
+                assert!(
+                    swinging < 1e-6 && without > 1e-3,
+                    "{more} {phase}: {swinging} {without}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_plant_without_states_beside_stays_as_it_was_reset() {
+        let mut plant = Plant::new(&Parameters::paper_table()).unwrap();
+        plant.reset_within(100.0, 5.0, &Load::resistor(20.0), &[0.5; 9]);
+        let before = *plant.state();
+        assert_eq!(plant.swing_beside(0.5, &Load::resistor(20.0)), 0);
+        assert_eq!(*plant.state(), before);
     }
 
     #[test]

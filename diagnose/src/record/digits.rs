@@ -35,7 +35,15 @@ fn divisor(a: i64, b: i64) -> i64 {
     if b == 0 { a } else { divisor(b, a % b) }
 }
 
-/// The step of which all values are multiples: a whole number of the last digit written, or at least five times it.
+/// Steps that may lie between the two values that are nearest to each other.
+// five gaps of which none is one step are rare, and two numbers of steps without a common factor begin with 2 and 3
+const STEPS_OF_SMALLEST: [f64; 3] = [1.0, 2.0, 3.0];
+/// Smallest step in last digits: below it what is rounded lies on any lattice.
+const LEAST_DIGITS: f64 = 4.5;
+/// A value on a lattice is off it by half a digit, and by a fifth for what the lattice itself is not known to.
+const OFF_DIGITS: f64 = 0.7;
+
+/// The step of which all values are multiples apart: a whole number of the last digit written, or at least five times it.
 pub fn lattice(values: &[f64], decimals: u32) -> f64 {
     let digit = last_digit(decimals);
     if let Some(step) = whole_step(values, digit) {
@@ -43,37 +51,54 @@ pub fn lattice(values: &[f64], decimals: u32) -> f64 {
     }
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
-    let gaps: Vec<f64> = sorted
-        .windows(2)
-        .map(|v| v[1] - v[0])
-        // between one digit and two: the same value, written twice
-        .filter(|gap| *gap > 1.5 * digit)
-        .collect();
-    let smallest = gaps.iter().copied().fold(f64::INFINITY, f64::min);
-    // five digits, of which rounding may take half a one
-    if sorted.len() < FEWEST || gaps.len() < 5 || smallest < 4.5 * digit {
+    let count = sorted.len();
+    // between one digit and two: the same value, written twice
+    sorted.dedup_by(|next, kept| *next - *kept <= 1.5 * digit);
+    if count < FEWEST || sorted.len() < 6 {
         return 0.0;
     }
-    let (low, high) = (sorted[0], sorted[sorted.len() - 1]);
-    // rounding of the written digits: the step is known ever better over a longer span
-    let mut step = smallest;
-    for gap in &sorted {
-        let count = ((gap - low) / step).round();
-        // two values, each off by half a digit, and as much again for the step so far
-        if count >= 1.0 && (gap - low - count * step).abs() <= 1.01 * digit * 2.0 {
-            step = (gap - low) / count;
+    let smallest = sorted.windows(2).map(|v| v[1] - v[0]).fold(f64::INFINITY, f64::min);
+    let steps = STEPS_OF_SMALLEST.iter().map(|steps| smallest / steps);
+    steps
+        .take_while(|step| *step >= LEAST_DIGITS * digit)
+        .find_map(|step| step_near(&sorted, step, digit))
+        .unwrap_or(0.0)
+}
+
+/// The step near `first` of which the `sorted` values are multiples apart, all within what rounding to a `digit` leaves open. It is known the
+/// better, the longer the span: spans come from the shortest on, each with the number of steps that those before it leave possible.
+fn step_near(sorted: &[f64], first: f64, digit: f64) -> Option<f64> {
+    // two values, each off by half a digit
+    let [mut low, mut high] = [first - 1.01 * digit, first + 1.01 * digit];
+    for apart in (0..usize::BITS)
+        .map(|power| 1 << power)
+        .take_while(|apart| *apart < sorted.len())
+    {
+        let mut spans: Vec<f64> = sorted.windows(apart + 1).map(|v| v[apart] - v[0]).collect();
+        spans.sort_by(f64::total_cmp);
+        for span in spans {
+            let [most, least] = [(span + digit) / low, (span - digit) / high];
+            let steps = (0.5 * (most + least)).round();
+            // two numbers of steps are possible: this span tells nothing yet
+            if steps < 1.0 || most - least >= 1.0 {
+                continue;
+            }
+            low = low.max((span - 1.01 * digit) / steps);
+            high = high.min((span + 1.01 * digit) / steps);
+            if low > high {
+                return None;
+            }
         }
     }
-    let near = |value: &f64| {
-        let count = ((value - low) / step).round();
-        // two values, each off by half a digit, and a fifth for the step
-        (value - low - count * step).abs() <= 1.2 * digit
-    };
-    if sorted.iter().all(near) && high > low {
-        step
-    } else {
-        0.0
-    }
+    let step = 0.5 * (low + high);
+    let base = sorted[0];
+    let off: Vec<f64> = (sorted.iter())
+        .map(|value| value - base - ((value - base) / step).round() * step)
+        .collect();
+    let ends = off
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(*v), b.max(*v)]);
+    (ends[1] - ends[0] <= 2.0 * OFF_DIGITS * digit).then_some(step)
 }
 
 #[cfg(test)]

@@ -116,6 +116,31 @@ fn a_converter_step_is_found_and_plain_digits_are_not() {
     assert_eq!(lattice(&off, 3), 0.0);
 }
 
+/// Few values far apart, of which the nearest two are a step that the digits show to a hundredth only.
+#[test]
+fn a_converter_step_is_found_in_values_far_apart() {
+    let step = 0.212_829_17;
+    let counts = [
+        600, 599, 597, 704, 707, 680, 641, 607, 584, 570, 569, 579, 595, 612, 624, 630, 629, 621, 611, 605,
+    ];
+    let written = |counts: &[i32]| -> Vec<f64> {
+        let of = |count: &i32| (f64::from(*count) * step * 1000.0).round() / 1000.0;
+        counts.iter().map(of).collect()
+    };
+    let found = lattice(&written(&counts), 3);
+    assert!((found - step).abs() < 1e-5, "{found}");
+    // none of which are one step apart
+    let coarse = [
+        600, 602, 605, 707, 710, 680, 641, 607, 584, 570, 567, 579, 595, 612, 624, 632, 629, 621, 615, 635,
+    ];
+    let found = lattice(&written(&coarse), 3);
+    assert!((found - step).abs() < 1e-5, "{found}");
+    // one value between the steps
+    let mut broken = written(&counts);
+    broken[7] += 0.1;
+    assert_eq!(lattice(&broken, 3), 0.0);
+}
+
 /// Rows at 0.5 of periods of 300 kHz, as a logger writes them with `digits` behind the point.
 fn at_300_khz(write: impl Fn(f64) -> String, edit: impl Fn(usize, String) -> String) -> Record {
     let mut parameters = Parameters::paper_table();

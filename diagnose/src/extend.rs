@@ -215,7 +215,7 @@ fn notes(diagnosis: &Diagnosis, after: &Parameters, trim: f64) -> BTreeMap<&'sta
             .iter()
             .zip(diagnosis.profiles.iter().filter(|p| p.member == member))
         {
-            for key in knob.keys {
+            for key in knob.valued_keys() {
                 let [low, high] = profile.interval;
                 intervals.insert(key, format!("95 %: {low:.5e} to {high:.5e}; "));
             }

@@ -60,7 +60,9 @@ pub fn in_part(problem: &Problem, attribution: &Attribution, say: Listener<'_>) 
         return Vec::new();
     }
     let is_other = |cause: &usize| {
-        let own = attribution.candidates[*cause].form.begins_at_own();
+        let candidate = &attribution.candidates[*cause];
+        // nor what is in proportion: a number that can be put back has no ratio to others
+        let own = candidate.form.begins_at_own() && !candidate.is_in_proportion();
         own && best.causes.iter().all(|known| !attribution.same(*known, *cause))
     };
     let others: Vec<usize> = (0..attribution.candidates.len()).filter(is_other).collect();

@@ -1,7 +1,7 @@
 //! What the circuit itself has wrong: switch, inductor, output capacitor.
 
 use super::knob::Reach;
-use super::list::{EDGE, OHMS, form, knob, searched};
+use super::list::{EDGE, OHMS, form, knob, scaled, searched};
 use super::{Cause, Kind, Search};
 
 pub(super) const DCR: Cause = Cause {
@@ -16,10 +16,17 @@ pub(super) const DCR: Cause = Cause {
 pub(super) const R_DS_ON: Cause = Cause {
     id: "r_ds_on",
     kind: Kind::Part,
-    forms: &[form(
-        "on-resistance of the switch",
-        &[knob("r_ds_on", &["switch.r_ds_on"], OHMS)],
-    )],
+    forms: &[
+        form(
+            "on-resistance of the switch",
+            &[knob("r_ds_on", &["switch.r_ds_on"], OHMS)],
+        ),
+        // heat and the gate's voltage do the same to both
+        form(
+            "on-resistance of both switches, in proportion",
+            &[scaled("r_ds_on", &["switch.r_ds_on", "switch.r_ds_on_low"], OHMS)],
+        ),
+    ],
 };
 
 pub(super) const DIODE: Cause = Cause {

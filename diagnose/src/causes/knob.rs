@@ -63,6 +63,9 @@ const NO_LAG: f64 = 0.01;
 /// voltage, as half of the load's resistance takes a third of the output's.
 const SEEN: f64 = 0.4;
 
+/// Least value of numbers that keep their ratio: below anything that could be told from 0, and far above where products of two are 0.
+const LEAST: f64 = 1e-12;
+
 /// One parameter of a cause.
 #[derive(Debug, Clone, Copy)]
 pub struct Knob {
@@ -70,6 +73,8 @@ pub struct Knob {
     pub name: &'static str,
     /// Keys of the plant that take its value; none for the sampling instant and the resistors of the load.
     pub keys: &'static [&'static str],
+    /// The first of the keys alone takes the value, and the others keep their ratio to it.
+    pub in_proportion: bool,
     pub(super) reach: Reach,
     /// A step of the duty that cuts off what is no whole count: to the nearest one of half a count less.
     pub(super) cuts_off: bool,
@@ -85,6 +90,7 @@ impl Knob {
         Knob {
             name,
             keys,
+            in_proportion: false,
             reach: Reach::Plain(low, high, step),
             cuts_off: false,
             resistor: None,
@@ -96,6 +102,15 @@ impl Knob {
     #[must_use]
     pub fn is_resistor(&self) -> bool {
         self.resistor.is_some()
+    }
+
+    /// The keys that are given its very value.
+    #[must_use]
+    pub fn valued_keys(&self) -> &'static [&'static str] {
+        match self.in_proportion {
+            true => &self.keys[..1],
+            false => self.keys,
+        }
     }
 
     /// Keys of the plant file under which a user knows the number. The sampling instant and the resistors of the load, which a record may
@@ -152,6 +167,16 @@ impl Knob {
         if self.cuts_off {
             // less than half by what decimals miss of a whole count
             model.plant.pwm.duty_offset = -(0.5 - 1e-6) * value;
+        }
+        let mut parameters = self.keys.iter().filter_map(|key| plant::parameter(key));
+        if let Some(first) = parameters.next().filter(|_| self.in_proportion) {
+            // of nothing there would be no ratio to go on from
+            let by = value.max(LEAST) / first.get(&model.plant);
+            for parameter in [first].into_iter().chain(parameters) {
+                let scaled = by * parameter.get(&model.plant);
+                parameter.set(&mut model.plant, scaled);
+            }
+            return;
         }
         for parameter in self.keys.iter().filter_map(|key| plant::parameter(key)) {
             parameter.set(&mut model.plant, value);

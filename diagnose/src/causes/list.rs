@@ -7,6 +7,7 @@ pub(super) const fn knob(name: &'static str, keys: &'static [&'static str], reac
     Knob {
         name,
         keys,
+        in_proportion: false,
         reach,
         cuts_off: false,
         resistor: None,
@@ -22,26 +23,27 @@ pub(super) const fn cutting(name: &'static str, keys: &'static [&'static str], r
     }
 }
 
+/// Several numbers that keep their ratios.
+pub(super) const fn scaled(name: &'static str, keys: &'static [&'static str], reach: Reach) -> Knob {
+    Knob {
+        in_proportion: true,
+        ..knob(name, keys, reach)
+    }
+}
+
 /// The factor of one resistor of the load.
 pub(super) const fn resistor(name: &'static str, number: usize) -> Knob {
     Knob {
-        name,
-        keys: &[],
-        reach: GAIN,
-        cuts_off: false,
         resistor: Some(number),
-        is_lag: false,
+        ..knob(name, &[], GAIN)
     }
 }
 
 pub(super) const fn lag(name: &'static str, keys: &'static [&'static str], reach: Reach) -> Knob {
     Knob {
         name,
-        keys,
-        reach,
-        cuts_off: false,
-        resistor: None,
         is_lag: true,
+        ..knob(name, keys, reach)
     }
 }
 

@@ -9,7 +9,7 @@ mod knob;
 mod list;
 mod surroundings;
 
-use plant::Topology;
+use plant::{Rectifier, Topology};
 
 use crate::drive::Model;
 use knob::Reach;
@@ -175,6 +175,12 @@ impl Candidate {
         CURVES.contains(&self.cause.id)
     }
 
+    /// Whether it moves several numbers in proportion.
+    #[must_use]
+    pub fn is_in_proportion(&self) -> bool {
+        self.form.knobs.iter().any(|knob| knob.in_proportion)
+    }
+
     /// Whether it changes one of these numbers of the plant file.
     #[must_use]
     pub fn changes(&self, keys: &[String]) -> bool {
@@ -248,6 +254,11 @@ pub fn candidates(model: &Model, bases: &Bases) -> Vec<Candidate> {
             .iter()
             .all(|key| value(key) == knob.keys.first().and_then(value))
     };
+    // where both switches are there
+    let is_in_proportion = |knob: &Knob| {
+        let leg = model.plant.converter.rectifier == Rectifier::Synchronous;
+        knob.in_proportion && leg && knob.keys.iter().all(|key| value(key) > Some(0.0))
+    };
     let is_known = |form: &Form| {
         let resistors = form.knobs.iter().filter(|knob| knob.resistor.is_some()).count();
         (resistors == 0 || resistors == model.resistors.len())
@@ -255,7 +266,10 @@ pub fn candidates(model: &Model, bases: &Bases) -> Vec<Candidate> {
             && (form.search != Search::Counter(Cut::Below) || model.plant.pwm.duty_offset == 0.0)
             && (is_buck || !form.knobs.iter().any(|knob| knob.keys.contains(&"capacitor.esl")))
             // one value for numbers that differ in the model is no place to begin
-            && (form.search != Search::Own || form.knobs.iter().all(is_one))
+            && (form.search != Search::Own || form.knobs.iter().all(|knob| match knob.in_proportion {
+                true => is_in_proportion(knob),
+                false => is_one(knob),
+            }))
     };
     causes
         .flat_map(|(number, cause)| cause.forms.iter().map(move |form| (number, cause, form)))

@@ -330,11 +330,13 @@ impl Searcher<'_> {
         })
     }
 
-    /// Candidates of other causes.
+    /// Candidates of other causes. Beside others both switches are almost the winding, and would only take a place that another cause needs.
     fn others(&self, causes: &[usize]) -> Vec<usize> {
-        let all = 0..self.fitter.candidates.len();
-        all.filter(|c| causes.iter().all(|known| !self.same(*known, *c)))
-            .collect()
+        let is_other = |c: &usize| {
+            let is_new = causes.iter().all(|known| !self.same(*known, *c));
+            is_new && !self.fitter.candidates[*c].is_in_proportion()
+        };
+        (0..self.fitter.candidates.len()).filter(is_other).collect()
     }
 
     /// The set with one cause replaced, if that is clearly better.

@@ -279,20 +279,33 @@ impl Attribution {
                 || is_of_counts
                 || coloured::is_of_rows(problem, self, *member)
         };
-        let mut weak: Vec<usize> = (0..best.causes.len()).filter(is_weak).collect();
+        let weak: Vec<usize> = (0..best.causes.len()).filter(is_weak).collect();
         let places = self.fitter(problem).places(&best.causes);
         let member = |place: &(usize, usize)| best.causes.iter().position(|cause| *cause == place.0).unwrap_or(0);
         let mut at_best: Vec<Profile> = (places.iter().zip(&best.values))
             .map(|(place, value)| Profile::at(member(place), *value))
             .collect();
+        self.leave_out_weak(problem, &mut at_best, weak)
+    }
+
+    /// [`Attribution::leave_out`] of causes whose evidence is too weak, but for one that moves edges where the trim would do more than edges
+    /// can in its place: the trim takes over what such a cause does, so that its evidence is small, and is none all the same.
+    pub fn leave_out_weak(
+        &mut self,
+        problem: &Problem,
+        profiles: &mut Vec<Profile>,
+        mut weak: Vec<usize>,
+    ) -> Vec<&'static str> {
         let mut without = self.clone();
-        let out = without.leave_out(problem, &mut at_best.clone(), &weak);
+        let mut left = profiles.clone();
+        let out = without.leave_out(problem, &mut left, &weak);
         if without.asks_for_edges() && !self.asks_for_edges() {
-            // the trim takes over what such a cause does, so that its evidence is small, and is more than edges do
-            weak.retain(|member| !self.candidates[best.causes[*member]].is_of_edges());
-            return self.leave_out(problem, &mut at_best, &weak);
+            let causes = self.best.as_ref().map_or(&[][..], |best| &best.causes);
+            weak.retain(|member| !self.candidates[causes[*member]].is_of_edges());
+            return self.leave_out(problem, profiles, &weak);
         }
         *self = without;
+        *profiles = left;
         out
     }
 

@@ -21,8 +21,14 @@ const MOST: f64 = 1000.0;
 const APART: f64 = 0.1;
 /// The averaged circuit may be off in the size of the response by as much. It knows no discontinuous conduction and no losses that
 /// depend on the duty; tolerances of L and C add 20 %. A convention: it only orders what is then simulated.
-const LEAST_SHARE: f64 = 0.7;
-const MOST_SHARE: f64 = 1.3;
+const SHARES: [f64; 2] = [0.7, 1.3];
+/// The same of a response that is simulated: it is off by its curvature alone. A convention, as above.
+const SIMULATED_SHARES: [f64; 2] = [0.9, 1.1];
+/// Levels of the duty whose responses are simulated, with all that the model has: each costs a simulation of the records, and beyond that many
+/// the averaged circuit does, whose errors at so many levels cancel. A convention for time.
+const SIMULATED_LEVELS: usize = 32;
+/// Change of the duty that tells a response: as large as a half step of 250 counts.
+const MOVED: f64 = 2e-3;
 /// A step of the duty this many times as large as what the edges of a gate are taken for does what they cannot.
 const BESIDE_EDGES: f64 = 4.0;
 /// Steps of the integration in a period: 1/140 of the period of the paper's filter with 150 uF. The semi-implicit method of Euler
@@ -49,8 +55,7 @@ pub(crate) fn likely(
         .map(|n| FEWEST + n as f64 * APART)
         .collect();
     let beside = orthonormal(beside);
-    let projected = |moved: &(dyn Fn(f64) -> f64 + Sync)| {
-        let mut column = response(problem, plant, moved);
+    let projected = |mut column: Vec<f64>| {
         for (value, left) in column.iter_mut().zip(residual.iter()) {
             // where nothing counts
             if *left == 0.0 {
@@ -63,15 +68,21 @@ pub(crate) fn likely(
     };
     // what all duties are moved by alike the edges of the gate take over, and better than this circuit knows it
     let shares = levels(problem);
+    let is_simulated = shares.len() <= SIMULATED_LEVELS;
     let parts = (shares.len() <= FEW_LEVELS).then(|| {
-        // the circuit is linear: what a rounding does is the sum of what it does at each level of the duty
-        let columns = parallel::map(&shares, |(level, _)| {
-            projected(&|duty| f64::from(u8::from(duty == *level)))
+        // small changes add up: what a rounding does is the sum of what it does at each level of the duty
+        let columns = parallel::map(&shares, |(level, _)| match is_simulated {
+            true => projected(simulated(problem, from, *level)),
+            false => projected(response(problem, plant, &|duty| f64::from(u8::from(duty == *level)))),
         });
         let products = (columns.iter()).map(|a| columns.iter().map(|b| dot(a, b)).collect::<Vec<f64>>());
         let along: Vec<f64> = columns.iter().map(|column| dot(column, residual)).collect();
         (along, products.collect::<Vec<_>>())
     });
+    let [least_share, most_share] = match is_simulated {
+        true => SIMULATED_SHARES,
+        false => SHARES,
+    };
     let gains = parallel::map(&numbers, |counts| {
         let by = |duty: f64| rounded(duty, *counts, cut) - duty;
         let mean = shares.iter().map(|(duty, share)| share * by(*duty)).sum::<f64>();
@@ -83,12 +94,12 @@ pub(crate) fn likely(
                 (dot(along, &by), square.sum())
             }
             None => {
-                let column = projected(&moved);
+                let column = projected(response(problem, plant, &moved));
                 (dot(&column, residual), dot(&column, &column))
             }
         };
         // a count that rounds no duty has no response at all
-        let share = (along / length.max(1e-300)).clamp(LEAST_SHARE, MOST_SHARE);
+        let share = (along / length.max(1e-300)).clamp(least_share, most_share);
         // by how much chi-square falls if that share of the response is taken away
         2.0 * share * along - share * share * length
     });
@@ -108,6 +119,26 @@ pub(crate) fn likely(
         }
     }
     found
+}
+
+/// Change of the signals over their noise, for each 1 of duty, where the duties of one `level` are moved.
+fn simulated(problem: &Problem, from: &State, level: f64) -> Vec<f64> {
+    let mut model = from.model.clone();
+    // a step that the model has already would hide the change
+    model.plant.pwm.duty_lsb = 0.0;
+    let by = if level + MOVED < 1.0 { MOVED } else { -MOVED };
+    let moved = |by: f64| {
+        let mut moved = problem.clone();
+        let duties = moved.records.iter_mut().flat_map(|record| &mut record.duty);
+        duties.filter(|duty| **duty == level).for_each(|duty| *duty += by);
+        moved.residual(&model, &from.starts)
+    };
+    let [there, back] = [moved(0.5 * by), moved(-0.5 * by)];
+    there
+        .iter()
+        .zip(&back)
+        .map(|(there, back)| (back - there) / by)
+        .collect()
 }
 
 /// Directions of length 1, each at right angles to those before it; what lies in these but for rounding is left out.
@@ -350,7 +381,16 @@ mod tests {
         let problem = problem(&model);
         let mut real = model.clone();
         real.converter.capacitance *= 0.4;
-        let residual = response(&problem, &real, &|duty| rounded(duty, 37.0, Cut::Nearest) - duty);
+        // what a modulator of 37 counts does to the same simulation
+        let mut counted = real.clone();
+        counted.pwm.duty_lsb = 1.0 / 37.0;
+        let [plain, counted] =
+            [&real, &counted].map(|plant| problem.residual(&Model::new(plant), &problem.first_starts()));
+        let residual: Vec<f64> = plain
+            .iter()
+            .zip(&counted)
+            .map(|(plain, counted)| plain - counted)
+            .collect();
         let counts_of = |plant: &Parameters| {
             let from = State {
                 model: Model::new(plant),

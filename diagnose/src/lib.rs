@@ -49,6 +49,7 @@ mod median;
 pub mod next;
 pub mod noise;
 mod normal;
+mod open_counts;
 pub mod page;
 mod parallel;
 pub mod played;

@@ -232,3 +232,56 @@ fn what_a_small_cause_beside_would_do_to_a_value_is_a_note() {
         "{note}"
     );
 }
+
+/// A modulator of 67.3 counts, and a held-out duty that is regulated and goes to and fro about half a count.
+#[test]
+fn a_step_of_the_duty_that_training_leaves_open_is_no_other_cause() {
+    let counts = 67.3;
+    let commanded = |bench: Bench, duty: &[(usize, f64)], seed: u64| {
+        let applied: Vec<(usize, f64)> = duty
+            .iter()
+            .map(|(row, d)| (*row, (d * counts).round() / counts))
+            .collect();
+        let columns = [("v_out", 0.1, 0.061), ("i_l", 0.05, 0.0049), ("i_out", 0.05, 0.0049)];
+        let bench = Bench { duty: applied, ..bench };
+        let mut table = bench.run().measured(&columns, &mut Noise(seed)).without(&["v_in"]);
+        let rows = table.rows();
+        let of = |row: usize| duty.iter().rev().find(|step| step.0 <= row).map_or(0.0, |step| step.1);
+        *table.column("duty") = (0..rows).map(of).collect();
+        table
+    };
+    let train = commanded(
+        Bench::default(),
+        &[
+            (0, 0.5239),
+            (25, 0.4608),
+            (50, 0.5841),
+            (75, 0.5512),
+            (100, 0.4875),
+            (125, 0.6049),
+            (150, 0.4471),
+            (175, 0.5667),
+        ],
+        5,
+    );
+    // 34.5 counts are .51263
+    let swing: Vec<(usize, f64)> = (0..200)
+        .map(|n| (n, 0.51263 + 1.6e-3 * (0.11 * n as f64).sin()))
+        .collect();
+    let held = commanded(Bench::default(), &swing, 6);
+    let read = |name: &str, table: &bench::Table| table.read(name, &model()).unwrap();
+    let found = diagnose(&model(), vec![read("train", &train)], &[read("held", &held)], &|_| ());
+    let findings = &found.findings;
+    println!("{} {:?}", findings.sentence, findings.noise.repairs);
+    let ids: Vec<&str> = findings.causes.iter().map(|cause| cause.id).collect();
+    assert_eq!(
+        (findings.verdict, &ids[..]),
+        (Verdict::Explained, &["duty_quantisation"][..]),
+        "{}",
+        findings.sentence
+    );
+    let step = &findings.causes[0].parameters["duty_lsb"];
+    assert!(step.low <= 1.0 / counts && 1.0 / counts <= step.high, "{step:?}");
+    let v_out = findings.gain.heldout.iter().find(|one| one.channel == "v_o").unwrap();
+    assert!(v_out.removed.unwrap() > 0.95, "{v_out:?}");
+}

@@ -6,8 +6,9 @@ use crate::fit::State;
 use crate::ideal::Ideal;
 use crate::noise::channel;
 use crate::problem::{Problem, dot};
-use crate::record::Record;
+use crate::record::{LOAD_CURRENT, Record};
 use crate::spectrum::strongest_line;
+use plant::Load;
 
 /// A swing is missing in the other state where that holds less than one over this of the square that it should. Its frequency and damping are
 /// the filter's to about a third, as is the ratio of both swings: its square to twice. A convention above it.
@@ -62,14 +63,16 @@ pub(crate) fn is_kicked(problem: &Problem, state: &State, (index, n): (usize, us
 }
 
 /// Whether a channel's swing is missing in the other state, where it would be seen: inductor and capacitor hand on the same energy, so that
-/// a swing of the current is one of the voltage times sqrt(L / C), in every topology. Then an instrument shows what the converter does
-/// not do, say one that sticks while the current rings.
+/// a swing of the current is one of the voltage times sqrt(L / C), in every topology; and what the load draws follows the voltage at its
+/// conductance. Then an instrument shows what the converter does not do, say one that sticks while the current rings.
 pub(crate) fn is_missing_elsewhere(problem: &Problem, state: &State, (index, n): (usize, usize)) -> bool {
     let converter = &state.model.plant.converter;
     let impedance = (converter.inductance / converter.capacitance).sqrt();
     let (other, by) = match n {
         0 => (1, impedance.recip()),
         1 => (0, impedance),
+        // a load of constant current has none: then no voltage is behind its swing
+        LOAD_CURRENT => (0, conductance(&problem.records[index]).recip()),
         _ => return false,
     };
     let mean_square = |one: usize| {
@@ -79,6 +82,14 @@ pub(crate) fn is_missing_elsewhere(problem: &Problem, state: &State, (index, n):
     };
     let expected = (mean_square(n) - 1.0).max(0.0) * (problem.sigma[n] * by / problem.sigma[other]).powi(2);
     problem.sigma[other].is_finite() && expected > MISSED * mean_square(other)
+}
+
+/// The mean conductance of a record's load for small changes of its voltage, S: constant power draws less where it is higher.
+fn conductance(record: &Record) -> f64 {
+    let of = |(load, v): (&Load, &f64)| load.conductance - load.power / (v * v);
+    let volts = record.measured[0].iter().filter(|v| v.is_finite() && **v != 0.0);
+    let all: Vec<f64> = record.load.iter().zip(volts).map(|row| of(row).abs()).collect();
+    all.iter().sum::<f64>() / all.len().max(1) as f64
 }
 
 /// Whether what swings is larger in the rows right behind steps of duty and load than in as many that are farther from them.

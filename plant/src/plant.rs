@@ -140,8 +140,9 @@ impl Plant {
     /// hold the voltage, delayed sensors show it. Time starts at 0, the noise goes on.
     pub fn reset_at(&mut self, v_out: f64, i_l: f64, load: &Load) -> Sample {
         let drawn = load_setting::drawn(&self.parameters.load, load);
-        let duty = self.duty_without_losses(v_out);
-        let x = self.initial(v_out, i_l, &drawn);
+        let converter = &self.parameters.converter;
+        let duty = converter.topology.duty(converter.v_in, v_out);
+        let x = self.initial(v_out, i_l, &drawn, duty);
         let state = &mut self.state;
         state.x = x;
         state.path = Path::OPEN;
@@ -164,14 +165,8 @@ impl Plant {
         self.finish(signals, Track::at(i_l, v_out))
     }
 
-    fn duty_without_losses(&self, v_out: f64) -> f64 {
-        let converter = &self.parameters.converter;
-        converter.topology.duty(converter.v_in, v_out)
-    }
-
-    /// The states of a circuit without ripple around `v_out` V and `i_l` A.
-    pub(crate) fn initial(&self, v_out: f64, i_l: f64, drawn: &Load) -> States {
-        let duty = self.duty_without_losses(v_out);
+    /// The states of a circuit without ripple around `v_out` V and `i_l` A, where `duty` is in force.
+    fn initial(&self, v_out: f64, i_l: f64, drawn: &Load, duty: f64) -> States {
         let give = match self.parameters.converter.model {
             Model::Averaged => self.legs.averaged(duty).give,
             Model::Switched => {
@@ -206,13 +201,16 @@ impl Plant {
         if self.parameters.pwm.sampling_phase > 0.0 {
             self.state.gates.plan(&self.timing, self.state.applied);
         }
+        // which switch is on at the sampling instant the duty in force decides, and with it what of the output voltage is the ESR's
+        let drawn = load_setting::drawn(&self.parameters.load, load);
+        self.state.x = self.initial(v_out, i_l, &drawn, self.state.applied);
         sample
     }
 
     /// Moves the states behind a reset as those of `rest`, which end in the states `at_rest`, lie beside the ones without ripple.
     pub(crate) fn swing_as(&mut self, rest: &Sample, at_rest: &States, load: &Load) {
         let drawn = load_setting::drawn(&self.parameters.load, load);
-        let without_ripple = self.initial(rest.v_out, rest.i_l, &drawn);
+        let without_ripple = self.initial(rest.v_out, rest.i_l, &drawn, self.state.applied);
         let [i_out, v_in] = beside::swung(&mut self.state.x, at_rest, &without_ripple);
         let Sample { v_out, i_l, .. } = self.state.sample;
         let signals = Signals {

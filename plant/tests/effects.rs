@@ -392,3 +392,31 @@ fn the_rate_of_an_empirical_term_remembers_duties_behind_a_segment() {
         }
     }
 }
+
+/// The instant lies between the end of the pulse without losses and that of the duty in force. The ESR's voltage is another on either side: the
+/// output voltage that is given has to be that of the side on which the plant is.
+#[test]
+fn a_boost_put_beside_the_end_of_its_pulse_is_on_the_side_of_its_duty() {
+    let text = "[converter]\ntopology = \"boost\"\nrectifier = \"synchronous\"\nv_in = 41.0\ninductance = 540e-6\ncapacitance = 1.8e-6\n\
+                f_sw = 52e3\n[inductor]\ndcr = 0.6\n[capacitor]\nesr = 0.57\n[switch]\nr_ds_on = 0.5\nr_ds_on_low = 0.5\n\
+                [pwm]\ncarrier = \"trailing\"\nsampling_phase = 0.6\n";
+    let p = Parameters::from_toml("plant.toml".as_ref(), text).unwrap();
+    let load = Load::resistor(180.0);
+    let mut before = plant(&p);
+    before.reset_within(100.0, 1.5, &load, &[0.615; 9]);
+    let rest = before.rest(0.615, &load).0;
+    // without losses a duty below the instant would do
+    assert!(1.0 - 41.0 / rest.v_out < 0.6, "{rest:?}");
+    let mut again = plant(&p);
+    again.reset_within(rest.v_out, rest.i_l, &load, &[0.615; 9]);
+    for period in 0..10 {
+        let next = again.step(0.615, &load);
+        // the ESR's leap is .57 ohm times 1.4 A
+        assert!(
+            (next.v_out - rest.v_out).abs() < 1e-3,
+            "period {period}: {} V for {} V",
+            next.v_out,
+            rest.v_out
+        );
+    }
+}

@@ -15,7 +15,7 @@ pub const EFFECT: Effect = Effect {
         "S",
         // 0.1 to 5 W at 100 V across the inductance
         "conductance across the inductance",
-        (0.0, 0.1),
+        (0.0, 10.0),
         (1e-5, 5e-4),
         0.0
     )],

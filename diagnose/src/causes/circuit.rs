@@ -148,7 +148,8 @@ pub(super) const L_SATURATION: Cause = Cause {
             &[
                 knob("saturation", &["inductor.saturation"], Reach::Share(0.0, 0.99, 0.1)),
                 knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
-                knob("steepness", &["inductor.steepness"], Reach::Plain(0.5, 2.0, 0.1)),
+                // beyond what powders have, so that a core between them and ferrite ends inside
+                knob("steepness", &["inductor.steepness"], Reach::Plain(0.5, 4.0, 0.1)),
             ],
             Search::From(&[&[9.5, 15.0, 8.0], &[9.5, 25.0, 8.0], &[9.5, 12.0, 14.0]]),
         )
@@ -159,7 +160,7 @@ pub(super) const L_SATURATION: Cause = Cause {
                 // a steep core that loses more swings for ever where its current stops, and no settled point of it comes to rest
                 knob("saturation", &["inductor.saturation"], Reach::Share(0.0, 0.95, 0.1)),
                 knob("i_sat", &["inductor.i_sat"], Reach::Current(0.3, 8.0, 0.1)),
-                knob("steepness", &["inductor.steepness"], Reach::Plain(1.0, 32.0, 0.5)),
+                knob("steepness", &["inductor.steepness"], Reach::Plain(0.5, 32.0, 0.5)),
             ],
             Search::Knee,
         ),
@@ -216,8 +217,9 @@ pub(super) const CORE_LOSS: Cause = Cause {
         &[knob(
             "core_conductance",
             &["inductor.core_conductance"],
-            // a loss of a tenth of the load's power; no core is that bad
-            Reach::Conductance(0.1, 0.001),
+            // a loss of a tenth of the load's power in a buck; across the inductor of a boost lies a part of its output voltage alone, and a core
+            // that loses the same conducts three times as much
+            Reach::Conductance(0.3, 0.001),
         )],
     )],
 };

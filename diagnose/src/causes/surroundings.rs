@@ -139,8 +139,8 @@ pub(super) const CPL_BANDWIDTH: Cause = Cause {
         &[lag(
             "time_constant",
             &["load.cpl_time_constant"],
-            // 5 ms at 10 kHz, three times the slowest hidden; slower, constant power is a constant current
-            Reach::Time(0.0, 50.0, 0.5),
+            // 20 ms at 10 kHz, 0.2 ms at 1 MHz; slower, constant power is a constant current
+            Reach::Time(0.0, 200.0, 0.5),
         )],
     )],
 };

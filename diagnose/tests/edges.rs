@@ -160,15 +160,16 @@ fn of_lost(lost: f64, model: &Parameters) -> Diagnosis {
 #[test]
 fn what_edges_take_off_is_the_same_wherever_the_model_starts() {
     // late edges by themselves do the opposite where the current is negative, and a fit by tangents ended 14 % off, or at a cause of its own
-    for offset in [0.0, -0.012, -0.0145, -0.019] {
-        let found = of_lost(0.0145, &buck(offset)).findings;
+    // 38 ns at 250 kHz, the most that a half-bridge has shown
+    for offset in [0.0, -0.007, -0.0095, -0.014] {
+        let found = of_lost(0.0095, &buck(offset)).findings;
         assert_eq!(found.verdict, Verdict::Consistent, "{offset}: {}", found.sentence);
         let whole = offset + found.noise.trim;
-        assert!((whole + 0.0145).abs() < 1e-4, "{offset}: {whole}");
+        assert!((whole + 0.0095).abs() < 1e-4, "{offset}: {whole}");
     }
-    let found = of_lost(0.0145, &buck(0.0)).findings;
+    let found = of_lost(0.0095, &buck(0.0)).findings;
     assert!(
-        found.sentence.contains("on-time are lost in each period (348"),
+        found.sentence.contains("on-time are lost in each period (228"),
         "{}",
         found.sentence
     );
@@ -176,7 +177,7 @@ fn what_edges_take_off_is_the_same_wherever_the_model_starts() {
 
 #[test]
 fn more_than_edges_do_is_an_offset_of_the_duty_or_of_the_voltage() {
-    let diagnosis = of_lost(0.03, &buck(0.0));
+    let diagnosis = of_lost(0.0145, &buck(0.0));
     let found = &diagnosis.findings;
     assert_eq!(found.verdict, Verdict::Ambiguous, "{}", found.sentence);
     let first = &found.causes[0];

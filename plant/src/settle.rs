@@ -114,9 +114,9 @@ const WARM_UP: u32 = 10;
 const BETWEEN: u32 = 40;
 // four times the 9 steps that the slowest point of the tests takes; 5 are too few for discontinuous conduction
 const MOST_NEWTON: usize = 40;
-/// Periods after which a cable or a filter begins without ripple. A convention: five steps of Newton and what is run around them, where a
-/// circuit in continuous conduction takes two.
-const MOST_BESIDE: u32 = 100;
+/// Periods after which a cable or a filter begins without ripple. A convention: three steps of Newton and what is run around them, where a
+/// circuit in continuous conduction takes two. What comes to no rest takes all of them in every simulation of a fit.
+const MOST_BESIDE: u32 = 72;
 /// At rest a period moves no state by this share.
 // 0.1 uV at 100 V, a thousandth of what the two integrators differ by (1e-4 V); the tests hold from 1e-13 to 1e-6
 const AT_REST_1: f64 = 1e-9;

@@ -91,8 +91,8 @@ pub(super) const ESL: Cause = Cause {
     forms: &[form(
         "series inductance of the output capacitor",
         // the output jumps by esl / L of the switched voltage: a nanohenry is much beside a third of a microhenry. No capacitor with its
-        // leads has half of the inductor's; 10 uH is the plant's bound
-        &[knob("esl", &["capacitor.esl"], Reach::BesideInductor(0.5, 1e-4, 1e-5))],
+        // leads has half of the inductor's; 100 uH is the plant's bound
+        &[knob("esl", &["capacitor.esl"], Reach::BesideInductor(0.5, 1e-4, 1e-4))],
     )],
 };
 

@@ -15,7 +15,7 @@ pub const EFFECT: Effect = Effect {
         "H",
         // from a chip on its pads to a can with leads and wires of its own
         "series inductance",
-        (0.0, 1e-5),
+        (0.0, 1e-4),
         (5e-9, 2e-7),
         0.0
     )],

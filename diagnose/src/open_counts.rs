@@ -56,7 +56,8 @@ pub fn chosen(
     let [low, high] = profile.interval;
     let beyond = BEYOND * (high - low);
     let duties = heldout.iter().flat_map(|record| record.duty.iter().copied());
-    let tried = steps([low - beyond, high + beyond], duties, cut);
+    // a step near none has counts without end
+    let tried = steps([(low - beyond).max(0.5 * profile.value), high + beyond], duties, cut);
     let pairs = parallel::map(&tried, |step| {
         let mut values = best.values.clone();
         values[number] = *step;

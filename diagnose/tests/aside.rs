@@ -254,6 +254,15 @@ fn a_channel_that_drifts_by_little_beside_a_large_cause_is_set_aside() {
     assert!(v_in.low <= 188.0 && 188.0 <= v_in.high, "{v_in:?}");
 }
 
+/// An instrument with play: it follows only beyond a width.
+fn sticks(values: &mut [f64], width: f64) {
+    let mut play = values[0];
+    for value in values {
+        play = play.clamp(*value - width, *value + width);
+        *value = play;
+    }
+}
+
 #[test]
 fn a_current_probe_that_sticks_while_the_filter_rings_is_an_instrument() {
     // hardly damped: what the probe leaves of the current swings as the filter does, and the voltage has nothing of it
@@ -271,12 +280,7 @@ fn a_current_probe_that_sticks_while_the_filter_rings_is_an_instrument() {
     });
     let mut random = Noise(83);
     let tables = runs(&bench).map(|mut table| {
-        let shown = table.column("i_l");
-        let mut play = shown[0];
-        for value in shown {
-            play = play.clamp(*value - 0.2, *value + 0.2);
-            *value = play;
-        }
+        sticks(table.column("i_l"), 0.2);
         let noise = [("v_out", 0.02, 0.01), ("i_l", 0.02, 2e-3), ("i_out", 0.02, 2e-3)];
         table.measured(&noise, &mut random).without(&["v_in"])
     });
@@ -342,12 +346,7 @@ fn a_load_probe_that_sticks_while_the_filter_rings_is_an_instrument() {
     let tables = runs_beside(&bench, 1.0 / 1.2).map(|table| {
         let rows = table.rows();
         let mut table = table.with("r_load", vec![1.2; rows]);
-        let shown = table.column("i_out");
-        let mut play = shown[0];
-        for value in shown {
-            play = play.clamp(*value - 0.5, *value + 0.5);
-            *value = play;
-        }
+        sticks(table.column("i_out"), 0.5);
         let noise = [("v_out", 0.01, 1e-3), ("i_l", 0.03, 2e-3), ("i_out", 0.03, 2e-3)];
         table.measured(&noise, &mut random).without(&["v_in"])
     });

@@ -86,9 +86,9 @@ pub(crate) fn is_missing_elsewhere(problem: &Problem, state: &State, (index, n):
 
 /// The mean conductance of a record's load for small changes of its voltage, S: constant power draws less where it is higher.
 fn conductance(record: &Record) -> f64 {
-    let of = |(load, v): (&Load, &f64)| load.conductance - load.power / (v * v);
-    let volts = record.measured[0].iter().filter(|v| v.is_finite() && **v != 0.0);
-    let all: Vec<f64> = record.load.iter().zip(volts).map(|row| of(row).abs()).collect();
+    let of = |(load, v): (&Load, &f64)| (load.conductance - load.power / (v * v)).abs();
+    let rows = record.load.iter().zip(&record.measured[0]);
+    let all: Vec<f64> = rows.map(of).filter(|slope| slope.is_finite()).collect();
     all.iter().sum::<f64>() / all.len().max(1) as f64
 }
 

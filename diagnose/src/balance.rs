@@ -23,7 +23,7 @@ const LEFT: f64 = 0.01;
 const MORE: usize = 3;
 
 /// A settled point: voltage, duty, drawn current.
-type Point = (f64, f64, f64);
+pub(crate) type Point = (f64, f64, f64);
 
 /// What is wrong, if no such converter gives the settled points of a record, or where the records rest ([`crate::rising`]).
 #[must_use]
@@ -81,39 +81,62 @@ const NUDGE: f64 = 1e-4;
 const OF_COUNTER: f64 = 1.0 / 3.0;
 /// Fewest points beyond the terms.
 const MORE_FOR_COUNTER: usize = 12;
+/// Counts beyond which none is sought: half a step is the accuracy of ideal edges ([`crate::problem::duty_accuracy`]), and tens of thousands would take
+/// seconds.
+const MOST_COUNTS: f64 = 2000.0;
 /// Most points that are asked: of thousands each count would cost as much as a simulation.
 const ASKED: usize = 64;
 
 /// Whether the points are those of a converter whose counter knows few duties: the commanded ones are not what the switch did.
 fn is_of_counter(ideal: &Ideal, points: &[Point], rms: f64) -> bool {
-    let mean = points.iter().map(|p| p.1).sum::<f64>() / points.len().max(1) as f64;
-    let slope = (ideal.volts(mean + NUDGE) - ideal.volts(mean)) / NUDGE;
-    // a duty that is rounded is off by its step over the root of twelve
-    let counts = slope.abs() / (rms * libm::sqrt(12.0));
-    let [low, high] = AROUND.map(|share| share * counts);
     let points: Vec<Point> = points
         .iter()
         .copied()
         .step_by(points.len().div_ceil(ASKED).max(1))
         .collect();
+    let v: Vec<f64> = points.iter().map(|p| p.0).collect();
+    let least = least_of_counters(ideal, &points, rms, |rounded| {
+        let columns = columns(ideal.topology, rounded);
+        (left(&columns, &v), columns.len())
+    });
+    least.is_some_and(|(least, _)| least < OF_COUNTER * rms)
+}
+
+/// The least root mean square that is left beside the duties of any counter whose rounding may scatter the voltage by `rms`; `left_by` tells the sum of
+/// squares and the terms for points at the duties of one; and how many were tried. Nothing where there are too few points for such a search.
+pub(crate) fn least_of_counters(
+    ideal: &Ideal,
+    points: &[Point],
+    rms: f64,
+    left_by: impl Fn(&[Point]) -> (f64, usize),
+) -> Option<(f64, usize)> {
+    if points.len() > ASKED || rms.is_nan() || rms <= 0.0 {
+        return None;
+    }
+    let mean = points.iter().map(|p| p.1).sum::<f64>() / points.len().max(1) as f64;
+    let slope = (ideal.volts(mean + NUDGE) - ideal.volts(mean)) / NUDGE;
+    // a duty that is rounded is off by its step over the root of twelve
+    let counts = slope.abs() / (rms * libm::sqrt(12.0));
+    let [low, high] = AROUND.map(|share| share * counts);
+    if high > MOST_COUNTS {
+        return None;
+    }
     let tried = (0..=((high - low) / APART) as usize).map(|n| low + n as f64 * APART);
-    let left_by = |counts: f64, cut: f64| {
+    let beside = |counts: f64, cut: f64| {
         let rounded = |p: &Point| (p.0, libm::floor(p.1 * counts + cut) / counts, p.2);
-        let points: Vec<Point> = points.iter().map(rounded).collect();
+        let rounded: Vec<Point> = points.iter().map(rounded).collect();
         // no counter leaves a switch on for ever
-        if points.iter().any(|p| p.1 >= 1.0) {
-            return f64::INFINITY;
+        if rounded.iter().any(|p| p.1 >= 1.0) {
+            return None;
         }
-        let columns = columns(ideal.topology, &points);
-        let v: Vec<f64> = points.iter().map(|p| p.0).collect();
-        let free = points.len().saturating_sub(columns.len());
-        match free >= MORE_FOR_COUNTER {
-            true => (left(&columns, &v) / free as f64).sqrt(),
-            false => f64::INFINITY,
-        }
+        let (square, terms) = left_by(&rounded);
+        let free = points.len().saturating_sub(terms);
+        (free >= MORE_FOR_COUNTER).then(|| (square / free as f64).sqrt())
     };
-    let mut each = tried.flat_map(|counts| [0.0, 0.5].map(|cut| left_by(counts, cut)));
-    each.any(|left| left < OF_COUNTER * rms)
+    let mut tries = 0;
+    let each = tried.flat_map(|counts| [0.0, 0.5].map(|cut| beside(counts, cut)));
+    let least = each.flatten().inspect(|_| tries += 1).reduce(f64::min)?;
+    Some((least, tries))
 }
 
 /// A row as a point, where the current never rests.
@@ -121,27 +144,6 @@ fn point(ideal: &Ideal, record: &Record, row: usize, v: f64) -> Option<Point> {
     let (d, i) = (record.duty[row], ideal::drawn(&record.load[row], v));
     // at a duty of 1 the form of a boost has no value
     (v.is_finite() && d < 1.0 && ideal.never_rests(i, d)).then_some((v, d, i))
-}
-
-/// Points beyond the terms of the form from which on they tell a noise: five degrees of freedom tell it to a third, and the noise of so few
-/// values counts half as much again ([`crate::noise`]).
-const TELLING: usize = 5;
-
-/// Standard deviation of `values`, one for each row of a settled record and 0 where nothing counts, beside what any losses may do: whatever the order
-/// of the rows. Rows that are written down duty by duty have other loads beside them, and their differences show the losses as noise.
-#[must_use]
-pub(crate) fn scatter(problem: &Problem, record: &Record, values: &[f64]) -> Option<f64> {
-    let ideal = Ideal::of(record, &problem.base.plant);
-    // what a resistor draws at the measured voltage holds that one's noise, which would then be explained by itself
-    let v_in = problem.base.plant.converter.v_in * record.v_in_ratio;
-    let v_of = |row: usize| ideal.topology.voltage(v_in, record.duty[row]);
-    let rows = (0..record.rows()).filter(|row| values.get(*row).is_some_and(|value| *value != 0.0));
-    let (points, values): (Vec<Point>, Vec<f64>) = rows
-        .filter_map(|row| Some((point(&ideal, record, row, v_of(row))?, values[row])))
-        .unzip();
-    let columns = columns(ideal.topology, &points);
-    let (count, terms) = (points.len(), columns.len());
-    (count >= terms + TELLING).then(|| (left(&columns, &values) / (count - terms) as f64).sqrt())
 }
 
 /// The sum of squares that the columns leave of some values.
@@ -161,7 +163,7 @@ pub(crate) fn left(columns: &[Vec<f64>], values: &[f64]) -> f64 {
 }
 
 /// The terms of the form at each point, around their means, so that the equations are well conditioned.
-fn columns(topology: Topology, points: &[Point]) -> Vec<Vec<f64>> {
+pub(crate) fn columns(topology: Topology, points: &[Point]) -> Vec<Vec<f64>> {
     let count = points.len().max(1) as f64;
     let mean = |of: fn(&Point) -> f64| points.iter().map(of).sum::<f64>() / count;
     let of_duty: fn(&Point) -> f64 = match topology {

@@ -1,12 +1,17 @@
 //! What a record's converter shows at rest without losses, in continuous conduction: sizes to judge by, before any simulation.
 
-use plant::{Carrier, Load, Parameters, Topology};
+use plant::{Carrier, Load, Parameters, Rectifier, Topology};
 
 use crate::record::Record;
 
 /// Mean inductor current over half its ripple from which on it surely never rests: at rest the voltage is above that of the duty, at
 /// any factor.
 const CONTINUOUS: f64 = 1.2;
+
+/// A voltage that steps up rises with a light load to so many times that of the duty at most: nothing that is measured is above.
+const RISES: f64 = 100.0;
+/// Halvings of that range to below the digits of a meter.
+const BISECTIONS: usize = 40;
 
 /// The loss-free converter at the source voltage of a record.
 #[derive(Debug, Clone, Copy)]
@@ -19,6 +24,63 @@ pub struct Ideal {
     slope: f64,
     /// Switching periods in a swing of the filter.
     swing: f64,
+    /// Whether its current rests where it would turn.
+    rests: bool,
+}
+
+/// The inductor current over a period at rest: up while the switch is on, down behind that, and at `low` until the period's end.
+#[derive(Debug, Clone, Copy)]
+pub struct Triangle {
+    /// Its least, A.
+    low: f64,
+    /// Most above least, A.
+    height: f64,
+    /// Shares of the period of both sides.
+    lasts: [f64; 2],
+}
+
+impl Triangle {
+    /// The current at a share of the period behind the instant at which the switch turns on, A.
+    fn since(&self, since: f64) -> f64 {
+        let [up, down] = self.lasts;
+        let above = match since < up {
+            true => since / up,
+            false => 1.0 - (since - up) / down,
+        };
+        self.low + self.height * above.max(0.0)
+    }
+
+    /// The current at a phase of the period, A.
+    pub fn at(&self, carrier: Carrier, phase: f64) -> f64 {
+        if self.lasts.iter().any(|share| *share <= 0.0) {
+            return self.low + 0.5 * self.height;
+        }
+        self.since(since_on((carrier, self.lasts[0]), phase))
+    }
+
+    /// How far the current is above what a sensor with a low-pass of `tau` periods shows of it at a phase: behind a steep ripple a sensor shows
+    /// another current than flows.
+    // for a line of slope s the sensor is tau s behind, but for what is left of what it was behind before, which fades with tau
+    pub fn above_shown(&self, carrier: Carrier, phase: f64, tau: f64) -> f64 {
+        let [up, down] = self.lasts;
+        if tau <= 0.0 || up <= 0.0 || down <= 0.0 {
+            return 0.0;
+        }
+        let rest = (1.0 - up - down).max(0.0);
+        let sides = [(up, self.height / up), (down, -self.height / down), (rest, 0.0)];
+        let along =
+            |behind: f64, (lasts, slope): (f64, f64)| tau * slope + (behind - tau * slope) * libm::exp(-lasts / tau);
+        let period = |behind: f64| sides.iter().fold(behind, |behind, side| along(behind, *side));
+        // what is kept of a period's begin, and what a period adds
+        let (added, kept) = (period(0.0), libm::exp(-1.0 / tau));
+        let mut behind = added / (1.0 - kept);
+        let mut left = since_on((carrier, up), phase);
+        for (lasts, slope) in sides {
+            behind = along(behind, (left.min(lasts), slope));
+            left = (left - lasts).max(0.0);
+        }
+        behind
+    }
 }
 
 impl Ideal {
@@ -34,6 +96,7 @@ impl Ideal {
             topology: p.topology,
             v_in: p.v_in * v_in_ratio,
             slope: p.inductance * p.f_sw,
+            rests: p.rectifier == Rectifier::Diode,
             swing: std::f64::consts::TAU * (p.inductance * p.capacitance).sqrt() * p.f_sw,
         }
     }
@@ -46,6 +109,35 @@ impl Ideal {
     /// Output voltage that a duty makes, V.
     pub fn volts(&self, duty: f64) -> f64 {
         self.topology.voltage(self.v_in, duty)
+    }
+
+    /// Output voltage at which the loss-free converter rests with a load: that of the duty, or where the inductor current rests in each period the
+    /// voltage up to which its triangles fill the load. For a duty between 0 and 1.
+    // the charge of a triangle, q = half L ipk (1/rise + 1/fall) ipk: what of it reaches the output is both sides for a buck, the fall for the others
+    pub fn volts_into(&self, load: &Load, duty: f64) -> f64 {
+        let own = self.volts(duty);
+        let peak = self.v_in * duty / self.slope;
+        let given = |v: f64| match self.topology {
+            Topology::Buck => 0.5 * duty * peak * (self.v_in - v).max(0.0) / v,
+            Topology::Boost => 0.5 * duty * peak * self.v_in / (v - self.v_in),
+            Topology::BuckBoost => 0.5 * duty * peak * self.v_in / v,
+        };
+        let most = match self.topology {
+            Topology::Buck => self.v_in,
+            Topology::Boost | Topology::BuckBoost => RISES * own,
+        };
+        if given(own) <= drawn(load, own) {
+            return own;
+        }
+        let (mut low, mut high) = (own, most);
+        for _ in 0..BISECTIONS {
+            let v = 0.5 * (low + high);
+            match given(v) > drawn(load, v) {
+                true => low = v,
+                false => high = v,
+            }
+        }
+        0.5 * (low + high)
     }
 
     /// Mean inductor current that delivers `drawn` at a duty, A.
@@ -62,39 +154,30 @@ impl Ideal {
         0.5 * volts / self.slope
     }
 
-    /// How far the inductor current is above what a sensor with a low-pass of `tau` seconds shows of it at rest, at the sampling instant `phase`
-    /// of a period of `t_sw` seconds: behind a steep ripple a sensor shows another current than flows. For a current that never rests.
-    // for a line of slope s the sensor is tau s behind, but for what is left of the corner before it, which fades with tau: e at the two
-    // corners follows from e(on) = e(off) b + step and e(off) = e(on) a - step, where tau s leaps by step
-    pub fn above_shown(&self, (carrier, duty): (Carrier, f64), phase: f64, tau: f64, t_sw: f64) -> f64 {
-        let lasts = [duty, 1.0 - duty].map(|share| share * t_sw);
-        if tau <= 0.0 || lasts.iter().any(|time| *time <= 0.0) {
-            return 0.0;
-        }
-        let slopes = [2.0 * self.half(duty) / lasts[0], -2.0 * self.half(duty) / lasts[1]];
-        let since = since_on((carrier, duty), phase) * t_sw;
-        let fades = lasts.map(|time| libm::exp(-time / tau));
-        let step = tau * (slopes[0] - slopes[1]) / (1.0 - fades[0] * fades[1]);
-        let (slope, corner, since) = match since < lasts[0] {
-            true => (slopes[0], step * (1.0 - fades[1]), since),
-            false => (slopes[1], -step * (1.0 - fades[0]), since - lasts[0]),
+    /// The inductor current over a period at rest, whose mean is `mean` A at an output of `volts` V.
+    pub fn triangle(&self, mean: f64, volts: f64, duty: f64) -> Triangle {
+        let (rises, falls) = match self.topology {
+            Topology::Buck => (self.v_in - volts, volts),
+            Topology::Boost => (self.v_in, volts - self.v_in),
+            Topology::BuckBoost => (self.v_in, volts),
         };
-        tau * slope - corner * libm::exp(-since / tau)
-    }
-
-    /// The inductor current at rest at the sampling instant `phase` of a period, whose mean is `mean`. Where it rests it begins at 0.
-    pub fn at_phase(&self, mean: f64, (carrier, duty): (Carrier, f64), phase: f64) -> f64 {
-        if duty <= 0.0 || duty >= 1.0 {
-            return mean;
+        // of a voltage that no such duty makes at rest the triangle would not close
+        let own = 2.0 * self.half(duty);
+        let is_closed = duty > 0.0 && duty < 1.0 && rises > 0.0 && falls > 0.0;
+        if self.rests && mean < self.half(duty) && is_closed {
+            let peak = rises / self.slope * duty;
+            let off = (peak * self.slope / falls).min(1.0 - duty);
+            return Triangle {
+                low: 0.0,
+                height: peak,
+                lasts: [duty, off],
+            };
         }
-        let half = self.half(duty);
-        let since = since_on((carrier, duty), phase);
-        let above_low = match since < duty {
-            true => 2.0 * half * since / duty,
-            false => 2.0 * half * (1.0 - (since - duty) / (1.0 - duty)),
-        };
-        // the triangle of a current that rests is narrower and as steep
-        (mean - half).max(0.0) + above_low
+        Triangle {
+            low: mean - 0.5 * own,
+            height: own,
+            lasts: [duty, 1.0 - duty],
+        }
     }
 
     /// Whether the inductor current surely never rests: a voltage then follows from the duty alone.
@@ -133,7 +216,7 @@ mod tests {
 
     /// 200 V, 2 mH and 10 kHz: at a duty of one half a ripple of 2.5 A to either side.
     #[test]
-    fn the_current_at_an_instant_lies_on_the_triangle_and_begins_at_0_where_it_rests() {
+    fn the_current_at_an_instant_lies_on_the_triangle() {
         let ideal = Ideal::at(&Parameters::paper_table(), 1.0);
         let half = ideal.half(0.5);
         for (carrier, off) in [
@@ -141,20 +224,55 @@ mod tests {
             (Carrier::Leading, 0.0),
             (Carrier::Centre, 0.75),
         ] {
-            let at = |mean: f64, phase: f64| ideal.at_phase(mean, (carrier, 0.5), phase);
             for mean in [2.0 * half, 5.0 * half] {
-                assert!((at(mean, off) - mean - half).abs() < 1e-9, "{carrier:?}: the peak");
-                assert!(
-                    (at(mean, off + 0.25) - mean).abs() < 1e-9,
-                    "{carrier:?}: on the way down"
-                );
-                assert!(
-                    (at(mean, off + 0.5) - mean + half).abs() < 1e-9,
-                    "{carrier:?}: the valley"
-                );
+                let at = |phase: f64| ideal.triangle(mean, 100.0, 0.5).at(carrier, phase);
+                assert!((at(off) - mean - half).abs() < 1e-9, "{carrier:?}: the peak");
+                assert!((at(off + 0.25) - mean).abs() < 1e-9, "{carrier:?}: on the way down");
+                assert!((at(off + 0.5) - mean + half).abs() < 1e-9, "{carrier:?}: the valley");
             }
-            assert!((at(0.1 * half, off + 0.5)).abs() < 1e-9 && at(0.1 * half, off) > 0.0);
+            // at 150 V it rises by 1.25 A, a quarter of the slope, and is down behind a sixth of the period
+            let at = |phase: f64| ideal.triangle(0.1 * half, 150.0, 0.5).at(carrier, phase);
+            assert!(
+                (at(off) - 1.25).abs() < 1e-9,
+                "{carrier:?}: the peak of a current that rests"
+            );
+            assert!(
+                (at(off + 1.0 / 12.0) - 0.625).abs() < 1e-9,
+                "{carrier:?}: on the way down"
+            );
+            assert!(
+                at(off + 0.2).abs() < 1e-9 && at(off + 0.49).abs() < 1e-9,
+                "{carrier:?}: at rest"
+            );
         }
-        assert_eq!(ideal.at_phase(3.0, (Carrier::Trailing, 1.0), 0.3), 3.0);
+        assert_eq!(ideal.triangle(3.0, 200.0, 1.0).at(Carrier::Trailing, 0.3), 3.0);
+    }
+
+    /// A sensor that follows such a current step by step shows as much less.
+    #[test]
+    fn a_slow_sensor_is_behind_a_current_whether_it_rests_or_not() {
+        let ideal = Ideal::at(&Parameters::paper_table(), 1.0);
+        for (mean, volts) in [(6.0, 100.0), (0.2, 150.0)] {
+            let triangle = ideal.triangle(mean, volts, 0.5);
+            for tau in [0.03, 0.3, 3.0] {
+                let (steps, mut shown) = (20_000, mean);
+                for period in 0..40 {
+                    for n in 0..steps {
+                        let phase = f64::from(n) / f64::from(steps);
+                        let true_one = triangle.at(Carrier::Trailing, phase);
+                        if period == 39 && n % 2_500 == 0 {
+                            let behind = triangle.above_shown(Carrier::Trailing, phase, tau);
+                            assert!(
+                                (true_one - shown - behind).abs() < 2e-3,
+                                "{mean} {tau} {phase}: {behind}"
+                            );
+                        }
+                        shown += (triangle.at(Carrier::Trailing, phase + 0.5 / f64::from(steps)) - shown)
+                            / tau
+                            / f64::from(steps);
+                    }
+                }
+            }
+        }
     }
 }

@@ -3,8 +3,8 @@
 mod few;
 mod rings;
 mod spikes;
+mod table;
 
-use crate::balance;
 use crate::exact::Exact;
 use crate::flicker;
 use crate::median::middle;
@@ -55,7 +55,8 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             let seen =
                 scatter_of_ringing(&shown, |rows| rows.iter().all(|v| *v != 0.0)).max(flicker::noise(&measured, digit));
             match one.settled {
-                true => balance::scatter(problem, one, &values).map_or(seen, |beside| beside.min(seen)),
+                true => table::scatter(problem, one, &values, n)
+                    .map_or(seen, |beside| beside.min(seen.max(few::of_order(beside, shown.len())))),
                 false => seen,
             }
         };
@@ -195,13 +196,14 @@ fn stuck(problem: &Problem, n: usize) -> f64 {
 #[must_use]
 pub fn inflation(problem: &Problem, residual: &[f64]) -> f64 {
     let (mut shared, mut pairs) = (0.0, 0.0);
-    let (mut lagged, mut total) = (vec![0.0; LAGS], 0.0);
+    let (mut lagged, mut total, mut count) = (vec![0.0; LAGS], 0.0, 0);
     for n in 0..CHANNELS {
         let all: Vec<Vec<f64>> = (0..problem.records.len())
             .map(|record| channel(problem, residual, record, n))
             .collect();
         for (k, a) in all.iter().enumerate() {
             total += dot(a, a);
+            count += a.iter().filter(|value| **value != 0.0).count();
             for (lag, sum) in lagged.iter_mut().enumerate() {
                 *sum += a.iter().zip(a.iter().skip(lag + 1)).map(|(x, y)| x * y).sum::<f64>();
             }
@@ -218,12 +220,18 @@ pub fn inflation(problem: &Problem, residual: &[f64]) -> f64 {
     }
     let rho = if pairs > 0.0 { shared / pairs } else { 0.0 };
     let records = problem.records.len() as f64;
-    // three standard deviations of the correlation of 250 rows of white noise, and of 3600 (three channels of records)
-    let same = if rho > 0.2 { 1.0 + rho * (records - 1.0) } else { 1.0 };
+    // three standard deviations of the correlation of so many rows of white noise: twenty lags of thirty settled points would add up to more than
+    // any noise, and .2 and .05 are those of 250 rows and of 3600, below which no noise is known to be that white
+    let by_chance = 3.0 / (count.max(1) as f64).sqrt();
+    let same = if rho > by_chance.max(0.2) {
+        1.0 + rho * (records - 1.0)
+    } else {
+        1.0
+    };
     let slow: f64 = lagged
         .iter()
         .map(|sum| sum / total.max(1e-300))
-        .filter(|rho| *rho > 0.05)
+        .filter(|rho| *rho > by_chance.max(0.05))
         .sum();
     // beyond 4 it is no noise but structure, and must not hide itself
     same * (1.0 + 2.0 * slow).clamp(1.0, 4.0)

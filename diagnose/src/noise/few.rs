@@ -61,6 +61,15 @@ fn of_meter(problem: &Problem, n: usize, scale: f64) -> f64 {
     POOR_METER * scale.max(reading + range)
 }
 
+/// Share of what few settled points leave beside any losses that their noise has at least, whatever their differences from row to row say: the
+/// smaller ones of a score may be a third of the rest by chance.
+const OF_REST: f64 = 0.5;
+
+/// Least noise of `count` settled points that leave `beside` beside any losses.
+pub(super) fn of_order(beside: f64, count: usize) -> f64 {
+    if (count as f64) < FEW { OF_REST * beside } else { 0.0 }
+}
+
 /// How much more the noise of few values may be than it shows.
 pub(super) fn unsure(problem: &Problem, n: usize) -> f64 {
     let records = problem.records.iter().filter(|record| !record.repeated);

@@ -1,6 +1,8 @@
 //! What initial states, instants of load steps, unsure levels of a load and the edges of the gate can explain of a signal: an orthonormal
 //! basis, to project it out and to move the estimates.
 
+use plant::Rectifier;
+
 use crate::drive::{FREE_APART, Model};
 use crate::parallel;
 use crate::problem::{Problem, Starts, axpy, dot};
@@ -28,6 +30,8 @@ pub struct Basis {
     spans: Vec<Span>,
     /// What acts across segments, in this order, each without what stands before it.
     across: Vec<Across>,
+    /// Least current that a segment may begin with, A: no diode carries one backwards, and from below 0 no step leads back.
+    least: f64,
 }
 
 /// An unknown that acts across segments.
@@ -81,13 +85,13 @@ impl Problem {
             if state == DRAWN && !self.may_be_drawing(model) {
                 return vec![0.0; residual.len()];
             }
-            for of_record in &mut moved.states {
+            for (record, of_record) in self.records.iter().zip(&mut moved.states) {
                 // a record begins at rest, or where its table begins to say what was drawn
-                let skipped = usize::from(state == DRAWN);
-                of_record
-                    .iter_mut()
-                    .skip(skipped)
-                    .for_each(|start| start[state] += step);
+                let is_moved = |segment: &Segment| state != DRAWN || segment.start > 0;
+                let begins = record.segments.iter().zip(of_record);
+                begins
+                    .filter(|(segment, _)| is_moved(segment))
+                    .for_each(|(_, start)| start[state] += step);
             }
             let after = self.residual(model, &moved);
             residual
@@ -110,6 +114,10 @@ impl Problem {
         let mut basis = Basis {
             spans,
             across: Vec::new(),
+            least: match model.plant.converter.rectifier {
+                Rectifier::Diode => 0.0,
+                Rectifier::Synchronous => f64::NEG_INFINITY,
+            },
         };
         for (unknown, raw) in self.moved_levels(model, starts, residual) {
             basis.add(unknown, raw);
@@ -127,7 +135,7 @@ impl Problem {
 
     /// Whether a load of constant power that lags may be on its way where a segment begins: behind lost rows nobody knows what it drew last.
     fn may_be_drawing(&self, model: &Model) -> bool {
-        let has_gaps = |record: &Record| !record.settled && record.segments.len() > 1;
+        let has_gaps = |record: &Record| !record.settled && record.segments.iter().any(|segment| segment.start > 0);
         let has_power = |record: &Record| record.load.iter().any(|load| load.power > 0.0);
         model.plant.load.cpl_time_constant > 0.0
             && (self.records.iter()).any(|record| has_gaps(record) && has_power(record))
@@ -312,7 +320,7 @@ impl Basis {
             let moves = span.moves(&u[span.from..span.to], moving);
             let start = &mut starts.states[span.record][span.segment];
             start[0] = (start[0] + moves[0]).max(0.0);
-            start[1] += moves[1];
+            start[1] = (start[1] + moves[1]).max(self.least);
             start[2] += moves[2];
             for (place, by) in span.steps.iter().zip(&moves[3..]) {
                 let late = &mut starts.late[span.record][*place];

@@ -371,7 +371,7 @@ fn partial_gain(problem: &Problem, attribution: &Attribution, held: Option<&Pair
 fn as_given(problem: &Problem, base: &Model, partial_gain: &mut [Worth], pair: Option<&Pair>) -> State {
     let mut held = problem.clone();
     held.trim_held = true;
-    let given = instants::scanned(&held, base, &held.first_starts());
+    let given = instants::scanned(&held, base, &held.first_starts(base));
     worth::before(partial_gain, (problem, &given), pair);
     given
 }

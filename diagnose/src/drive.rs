@@ -187,6 +187,51 @@ pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>
     (shown, ran)
 }
 
+/// Rows of a segment in which a sensor shows what no model tells, since nobody knows what was before a record and what came behind it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Unseen {
+    /// For each channel rows at the segment's begin: what a delayed sensor shows there is older.
+    begin: [usize; CHANNELS],
+    /// Rows at the record's begin, and at its end, whose samples lie in periods that have no row.
+    beyond: [usize; 2],
+}
+
+impl Unseen {
+    /// Of a model and a record.
+    pub fn of(model: &Model, record: &Record) -> Self {
+        let p = &model.plant;
+        if record.settled || record.duty_is == DutyIs::Direct {
+            return Self {
+                begin: [0; CHANNELS],
+                beyond: [0; 2],
+            };
+        }
+        let all = &p.sensors;
+        let mut channels = [&all.v_out, &all.i_l, &all.i_out, &all.v_in]
+            .into_iter()
+            .zip(record.is_true);
+        let late = if record.duty_is == DutyIs::Applied {
+            0.0
+        } else {
+            model.late
+        };
+        let whole = (record.phase + late / p.t_sw() + SAME).floor() as isize;
+        Self {
+            begin: std::array::from_fn(|_| match channels.next() {
+                Some((sensor, false)) if sensor.delay > 0.0 => 1 + (sensor.delay / p.t_sw()) as usize,
+                _ => 0,
+            }),
+            beyond: [(-whole).max(0).unsigned_abs(), whole.max(0).unsigned_abs()],
+        }
+    }
+
+    /// Whether a row of a segment is one for a channel.
+    pub fn holds(&self, record: &Record, segment: &Segment, row: usize, channel: usize) -> bool {
+        let [before, behind] = self.beyond;
+        row < segment.start + self.begin[channel] || row < before || row + behind >= record.rows()
+    }
+}
+
 /// Whether late edges would make of a trim what no line through its origin describes: where a synchronous leg's current is negative a late
 /// edge does nothing or the opposite, and where the on-interval lies in the middle of the period a late edge of either kind moves it
 /// the same way. A fit that takes tangents ends far off there.

@@ -244,7 +244,7 @@ impl Fitter<'_> {
         let own = self.problem.basis(model, starts, residual);
         let settle = |starts: &Starts| State::settle_in(self.problem, model, starts, Some(&own), 2);
         // those of the model as given may be too far off for a step from there: the records' own beginnings are another place
-        let [settled, afresh] = [settle(starts), settle(&self.problem.first_starts())];
+        let [settled, afresh] = [settle(starts), settle(&self.problem.first_starts(model))];
         let settled = if afresh.chi2 < settled.chi2 { afresh } else { settled };
         if settled.chi2 > RUN_AWAY * chi2 {
             return fit;

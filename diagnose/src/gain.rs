@@ -153,7 +153,7 @@ pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHA
     problem.trim_held = true;
     sampling::decide(&mut problem, extended);
     let mut remarks = other_chains(&mut problem, base, extended, trim);
-    let mut before = State::settle(&problem, base, &problem.first_starts(), None);
+    let mut before = State::settle(&problem, base, &problem.first_starts(base), None);
     if sides::leave_out(&mut problem, &before) {
         before = State::settle(&problem, base, &before.starts, None);
     }
@@ -174,7 +174,7 @@ pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHA
     };
     let [along, afresh] = [
         settle(&before.starts),
-        settle(&with_levels_of(&before.starts, problem.first_starts())),
+        settle(&with_levels_of(&before.starts, problem.first_starts(extended))),
     ];
     let after = if afresh.chi2 < along.chi2 { afresh } else { along };
     let inflation = noise::inflation(&problem, &after.residual);
@@ -228,7 +228,7 @@ fn other_chains(problem: &mut Problem, base: &Model, extended: &Model, trim: f64
                 ..record.clone()
             }];
             (alone.offsets, alone.masked) = (vec![0], vec![problem.masked[index].clone()]);
-            let mut starts = alone.first_starts();
+            let mut starts = alone.first_starts(extended);
             starts.trim = trim;
             State::settle(&alone, extended, &starts, None).chi2
         };

@@ -137,7 +137,7 @@ fn chi2_of(problem: &Problem, residual: &[f64], index: usize) -> f64 {
 /// The model with initial states and free instants fitted, instants sought over all that is possible.
 pub(crate) fn scanned(problem: &Problem, model: &Model, from: &Starts) -> State {
     let mut starts = from.clone();
-    starts.late = problem.first_starts().late;
+    starts.late = problem.first_starts(&problem.base).late;
     let steps: Vec<(usize, usize, usize, usize)> = windows(problem);
     let most = steps.iter().map(|step| step.1 + 1).max().unwrap_or(0);
     for nth in 0..most {

@@ -140,7 +140,7 @@ const MORE: [f64; 2] = [1.8, 4.0];
 /// Largest output voltage and inductor current at the sampling instants of an experiment.
 fn largest(record: &Record, model: &Model) -> [f64; 2] {
     let made = Problem::new(vec![record.clone()], model.clone());
-    let starts = made.first_starts();
+    let starts = made.first_starts(&made.base);
     let shown = crate::drive::simulate(model, &made.records[0], &starts.of(0));
     // what runs away is no number in the end, and no bench bears it
     let size = |value: f64| if value.is_nan() { f64::INFINITY } else { value.abs() };
@@ -166,7 +166,7 @@ fn is_borne(problem: &Problem, largest: [f64; 2]) -> bool {
 fn separation(problem: &Problem, record: &Record, one: &Model, other: &Model) -> f64 {
     let mut made = Problem::new(vec![record.clone()], one.clone());
     made.sigma = problem.sigma.map(|s| if s.is_finite() { s } else { f64::INFINITY });
-    let starts = made.first_starts();
+    let starts = made.first_starts(&made.base);
     let shown = crate::drive::simulate(one, &made.records[0], &starts.of(0));
     for n in 0..CHANNELS {
         if problem.sigma[n].is_finite() {

@@ -251,7 +251,7 @@ fn mean_square(problem: &Problem, null: &State, (index, record): (usize, &Record
         alone.sigma.swap(a, b);
     }
     let model = reading.map_or_else(|| null.model.clone(), |reading| reading.model(&null.model));
-    let state = State::settle(&alone, &model, &alone.first_starts(), None);
+    let state = State::settle(&alone, &model, &alone.first_starts(&model), None);
     state.chi2 / alone.count().max(1) as f64
 }
 

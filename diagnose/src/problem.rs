@@ -1,6 +1,7 @@
 //! Records, noise and model as one least-squares problem. The initial states are unknowns of no interest: they are
 //! estimated beside every fit, and the part of a signal that they can explain is projected out.
 
+mod beginnings;
 mod setup;
 
 use std::ops::Range;
@@ -9,9 +10,8 @@ use measured::DutyIs;
 
 use crate::capture::terms::Drive;
 use crate::causes::{Bases, Knob};
-use crate::drive::{Begin, Model, Start, simulate_counted};
+use crate::drive::{Begin, Model, Start, Unseen, simulate_counted};
 use crate::flicker;
-use crate::ideal::{self, Ideal};
 use crate::noise::Outlier;
 use crate::record::{CHANNELS, LOAD_CURRENT, Record};
 use crate::work::Work;
@@ -22,6 +22,9 @@ pub const LOST: f64 = 1e6;
 
 /// What stands in a residual where a value that counts is met to its last digit, over the noise: 0 says that nothing counts.
 const NO_ERROR: f64 = 1e-12;
+
+/// What stands in a residual where nobody knows what a right model would show, over the noise: as much as noise leaves.
+const AS_NOISE: f64 = 1.0;
 
 /// The channel in which a load step leaps beside its current.
 const OUTPUT_VOLTAGE: usize = 0;
@@ -217,63 +220,6 @@ impl Problem {
         self.records.is_empty()
     }
 
-    /// States to begin with: what was measured in the first rows.
-    #[must_use]
-    pub fn first_starts(&self) -> Starts {
-        let of = |record: &Record| {
-            record
-                .segments
-                .iter()
-                .map(|segment| self.guess(record, segment.start))
-                .collect()
-        };
-        Starts {
-            states: self.records.iter().map(of).collect(),
-            late: self
-                .records
-                .iter()
-                .map(|record| vec![0.0; record.free_steps.len()])
-                .collect(),
-            levels: self
-                .records
-                .iter()
-                .map(|record| vec![0.0; record.free_levels.len()])
-                .collect(),
-            trim: 0.0,
-        }
-    }
-
-    fn guess(&self, record: &Record, row: usize) -> Start {
-        let near = |channel: usize| {
-            let values = &record.measured[channel];
-            values.iter().skip(row).take(3).copied().find(|v| v.is_finite())
-        };
-        let (ideal, duty) = (Ideal::of(record, &self.base.plant), record.duty[row]);
-        let v = near(0).unwrap_or_else(|| ideal.volts(duty));
-        let drawn = ideal.inductor(ideal::drawn(&record.load[row], v), duty);
-        let i = near(1)
-            .map(|shown| shown + self.behind_sensor(record, row, drawn))
-            .unwrap_or_else(|| {
-                let mean = near(2).map_or(drawn, |measured| ideal.inductor(measured, duty));
-                // at an edge a whole half of the ripple beside the mean: from a current that rests no step leads to one that does not
-                ideal.at_phase(mean, (self.base.plant.pwm.carrier, duty), record.phase)
-            });
-        // without bound where no steady state is
-        let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
-        [finite(v.max(0.0)), finite(if record.settled { drawn } else { i }), 0.0]
-    }
-
-    /// How far the inductor current is above what its sensor shows in a row at which it delivers `mean`; 0 where it may rest.
-    fn behind_sensor(&self, record: &Record, row: usize, mean: f64) -> f64 {
-        let (p, duty) = (&self.base.plant, record.duty[row]);
-        let ideal = Ideal::of(record, p);
-        let is_raw = record.is_true[1] || record.duty_is == DutyIs::Direct;
-        if is_raw || record.settled || mean <= ideal.half(duty) {
-            return 0.0;
-        }
-        ideal.above_shown((p.pwm.carrier, duty), record.phase, p.sensors.i_l.low_pass, p.t_sw())
-    }
-
     /// Whether a value counts.
     fn counts(&self, record: usize, row: usize, channel: usize) -> bool {
         self.records[record].measured[channel][row].is_finite() && !self.masked[record][channel][row]
@@ -309,17 +255,19 @@ impl Problem {
             }
             let (shown, ran) = simulate_counted(model, record, &starts.of(index));
             rows += self.work.add(ran);
+            let unseen = Unseen::of(model, record);
             for segment in &record.segments {
-                let first = if record.settled {
-                    segment.start
-                } else {
-                    segment.start + 1
-                };
-                for row in first..segment.end {
-                    for channel in 0..CHANNELS {
+                let first = segment.start + usize::from(!record.settled);
+                for (row, shown) in (first..).zip(&shown[first.min(segment.end)..segment.end]) {
+                    for (channel, shown) in shown.iter().enumerate() {
                         if self.counts(index, row, channel) {
-                            let error = record.measured[channel][row] - shown[row][channel];
-                            out[self.offsets[index] + row * CHANNELS + channel] = self.scored(error, channel);
+                            let error = record.measured[channel][row] - shown;
+                            let place = self.offsets[index] + row * CHANNELS + channel;
+                            // not 0, or a delay would gain by what it hides
+                            out[place] = match unseen.holds(record, segment, row, channel) {
+                                true => AS_NOISE,
+                                false => self.scored(error, channel),
+                            };
                         }
                     }
                 }

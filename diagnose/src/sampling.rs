@@ -29,7 +29,7 @@ pub fn decide(problem: &mut Problem, model: &Model) {
                 ..record.clone()
             }];
             (alone.offsets, alone.masked) = (vec![0], vec![problem.masked[index].clone()]);
-            State::settle(&alone, model, &alone.first_starts(), None).chi2
+            State::settle(&alone, model, &alone.first_starts(model), None).chi2
         };
         let instants =
             [record.phase, model.plant.pwm.sampling_phase].map(|phase| (chi2(Sampled::Instant, phase), phase));

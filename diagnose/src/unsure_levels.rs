@@ -56,7 +56,7 @@ pub(crate) fn free(problem: &mut Problem, model: &Model, null: &mut State) -> bo
     for (record, levels) in problem.records.iter_mut().zip(free) {
         record.free_levels = levels;
     }
-    null.starts.levels = problem.first_starts().levels;
+    null.starts.levels = problem.first_starts(&problem.base).levels;
     problem.records.iter().any(|record| !record.free_levels.is_empty())
 }
 

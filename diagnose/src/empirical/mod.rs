@@ -92,7 +92,7 @@ pub fn described(problem: &Problem, model: &Model, trim: f64) -> Option<Describe
     problem.trim_held = true;
     let starts = Starts {
         trim,
-        ..problem.first_starts()
+        ..problem.first_starts(model)
     };
     let before = State::settle(&problem, model, &starts, None);
     let mut null = before.clone();

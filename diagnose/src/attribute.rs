@@ -207,6 +207,10 @@ fn completed(search: &Searcher<'_>, singles: Vec<Fit>, (best, evidence): (Option
     }
 }
 
+/// Share of the error above the noise that makes a counter the whole of it: what a limit cycle leaves beside a counter that imitates it is far more than
+/// a fiftieth. A convention.
+const ALL_OF_IT: f64 = 0.98;
+
 impl Attribution {
     /// To fit more.
     #[must_use]
@@ -273,8 +277,10 @@ impl Attribution {
         let is_weak = |member: &usize| {
             let parameters = self.candidates[best.causes[*member]].own.len();
             let form = self.candidates[best.causes[*member]].form;
-            // to which counts a duty is rounded nobody knows where the duty itself goes to and fro
-            let is_of_counts = beside_line && matches!(form.search, Search::Counter(_));
+            // to which counts a duty is rounded nobody knows where the duty itself goes to and fro; but of a counter that makes all of it the line may
+            // be, where a bench steps its duty in a rhythm
+            let makes_all = self.evidence[*member] > ALL_OF_IT * (self.null.chi2 - problem.count() as f64);
+            let is_of_counts = beside_line && !makes_all && matches!(form.search, Search::Counter(_));
             self.evidence[*member] < threshold(parameters, scatter[*member].max(sure * self.inflation))
                 || is_of_counts
                 || coloured::is_of_rows(problem, self, *member)

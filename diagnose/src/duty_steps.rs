@@ -1,10 +1,11 @@
 //! Which steps of a duty counter could have made a residual: the response to the rounding of the duty, by the averaged
 //! circuit linearised around each row, for thousands of steps.
 
-use std::ops::Range;
+mod pieces;
 
 use plant::{Parameters, Topology};
 
+use self::pieces::Piece;
 use crate::basis::Basis;
 use crate::causes::Cut;
 use crate::fit::State;
@@ -13,12 +14,10 @@ use crate::parallel;
 use crate::problem::{Problem, axpy, dot};
 use crate::record::{CHANNELS, Record};
 
-/// Counts per period that are looked at, and how far apart: half a count of the duty moves by less than a tenth. Below 8 counts no
-/// controller regulates; half a step of 1000 is 5e-4, the accuracy of a model of ideal edges
-/// ([`crate::problem::duty_accuracy`]).
+/// Counts per period that are looked at. Below 8 counts no controller regulates; half a step of 1000 is 5e-4, the accuracy of a model of ideal
+/// edges ([`crate::problem::duty_accuracy`]).
 const FEWEST: f64 = 8.0;
 const MOST: f64 = 1000.0;
-const APART: f64 = 0.1;
 /// The averaged circuit may be off in the size of the response by as much. It knows no discontinuous conduction and no losses that
 /// depend on the duty; tolerances of L and C add 20 %. A convention: it only orders what is then simulated.
 const SHARES: [f64; 2] = [0.7, 1.3];
@@ -51,9 +50,6 @@ pub(crate) fn likely(
         true => MOST,
         false => (BESIDE_EDGES * problem.duty_accuracy()).recip().clamp(FEWEST, MOST),
     };
-    let numbers: Vec<f64> = (0..=((finest - FEWEST) / APART) as usize)
-        .map(|n| FEWEST + n as f64 * APART)
-        .collect();
     let beside = orthonormal(beside);
     let projected = |mut column: Vec<f64>| {
         for (value, left) in column.iter_mut().zip(residual.iter()) {
@@ -83,8 +79,13 @@ pub(crate) fn likely(
         true => SIMULATED_SHARES,
         false => SHARES,
     };
-    let gains = parallel::map(&numbers, |counts| {
-        let by = |duty: f64| rounded(duty, *counts, cut) - duty;
+    let levels_alone: Vec<f64> = shares.iter().map(|(level, _)| *level).collect();
+    let pieces = match parts.is_some() {
+        true => pieces::all(&levels_alone, [FEWEST, finest], cut),
+        false => pieces::apart(&levels_alone, [FEWEST, finest], cut),
+    };
+    let gain = |counts: f64| {
+        let by = |duty: f64| rounded(duty, counts, cut) - duty;
         let mean = shares.iter().map(|(duty, share)| share * by(*duty)).sum::<f64>();
         let moved = |duty: f64| by(duty) - mean;
         let (along, length) = match &parts {
@@ -102,23 +103,18 @@ pub(crate) fn likely(
         let share = (along / length.max(1e-300)).clamp(least_share, most_share);
         // by how much chi-square falls if that share of the response is taken away
         2.0 * share * along - share * share * length
+    };
+    let best = parallel::map(&pieces, |piece| {
+        let within = piece.within().map(|counts| (gain(counts), counts));
+        within
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .unwrap_or((f64::NEG_INFINITY, piece.low))
     });
-    let mut pieces: Vec<(f64, Range<usize>)> = pieces(problem, &numbers, cut)
-        .into_iter()
-        .map(|piece| (gains[piece.clone()].iter().copied().fold(0.0, f64::max), piece))
-        .collect();
+    let mut ranked: Vec<((f64, f64), Piece)> = best.into_iter().zip(pieces).collect();
     // equal gains in the order of the counts, so that the same records give the same starts
-    pieces.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.start.cmp(&b.1.start)));
-    let mut found: Vec<f64> = Vec::new();
-    for (_, piece) in pieces.into_iter().take(count) {
-        let (first, last) = (piece.start, piece.end - 1);
-        for n in [first, (first + last) / 2, last] {
-            if !found.contains(&numbers[n]) {
-                found.push(numbers[n]);
-            }
-        }
-    }
-    found
+    ranked.sort_by(|(a, one), (b, other)| b.0.total_cmp(&a.0).then(one.low.total_cmp(&other.low)));
+    let kept = ranked.iter().take(count);
+    kept.flat_map(|((_, best), piece)| piece.tried(*best)).collect()
 }
 
 /// Change of the signals over their noise, for each 1 of duty, where the duties of one `level` are moved.
@@ -215,33 +211,16 @@ fn rounded(duty: f64, counts: f64, cut: Cut) -> f64 {
 
 /// Counts of a duty; as the plant rounds, half up.
 fn counted(duty: f64, counts: f64, cut: Cut) -> f64 {
-    let up = match cut {
+    libm::floor(duty * counts + up(cut))
+}
+
+/// What is added before the rest is cut off, counts.
+fn up(cut: Cut) -> f64 {
+    match cut {
         Cut::Nearest => 0.5,
         // a duty of whole counts, written in decimals, is those
         Cut::Below => WHOLE,
-    };
-    libm::floor(duty * counts + up)
-}
-
-/// Stretches of numbers that round every duty to the same count: what they make of a record changes smoothly within.
-fn pieces(problem: &Problem, numbers: &[f64], cut: Cut) -> Vec<Range<usize>> {
-    let mut duties: Vec<f64> = problem.records.iter().flat_map(|r| r.duty.iter().copied()).collect();
-    duties.sort_by(f64::total_cmp);
-    duties.dedup();
-    let count = |duty: f64, counts: f64| counted(duty, counts, cut);
-    let mut list = Vec::new();
-    let mut start = 0;
-    for n in 1..=numbers.len() {
-        let ends = n == numbers.len()
-            || duties
-                .iter()
-                .any(|d| count(*d, numbers[n - 1]) != count(*d, numbers[n]));
-        if ends {
-            list.push(start..n);
-            start = n;
-        }
     }
-    list
 }
 
 /// Change of the signals over their noise when each duty is `moved` by so much.
@@ -385,7 +364,7 @@ mod tests {
         let mut counted = real.clone();
         counted.pwm.duty_lsb = 1.0 / 37.0;
         let [plain, counted] =
-            [&real, &counted].map(|plant| problem.residual(&Model::new(plant), &problem.first_starts()));
+            [&real, &counted].map(|plant| problem.residual(&Model::new(plant), &problem.first_starts(&problem.base)));
         let residual: Vec<f64> = plain
             .iter()
             .zip(&counted)
@@ -394,7 +373,7 @@ mod tests {
         let counts_of = |plant: &Parameters| {
             let from = State {
                 model: Model::new(plant),
-                starts: problem.first_starts(),
+                starts: problem.first_starts(&problem.base),
                 chi2: dot(&residual, &residual),
                 residual: residual.clone(),
                 rows: 0,

@@ -8,8 +8,8 @@ use crate::findings::{Evidence, Named, Value, Verdict};
 use crate::fit::State;
 use crate::gain::{self, Pair};
 use crate::instants;
+use crate::left_open::{self, Chosen};
 use crate::noise::{self, Outlier};
-use crate::open_counts::{self, Chosen};
 use crate::preflight::{self, Misread};
 use crate::problem::Problem;
 use crate::profile::{Profile, parabolas, profiles};
@@ -275,8 +275,8 @@ impl Examined {
             let fails = pair.doubts(&self.problem, found, of_curve);
             if !fails.is_empty() {
                 let explained = (&self.attribution, &self.profiles[..]);
-                if let Some(chosen) = open_counts::chosen(&self.problem, explained, heldout, base) {
-                    return Some(self.with_counts(chosen));
+                if let Some(chosen) = left_open::chosen(&self.problem, explained, heldout, base) {
+                    return Some(self.with_values(chosen));
                 }
                 self.verdict = Verdict::Unexplained;
             }
@@ -289,13 +289,12 @@ impl Examined {
         Some(pair)
     }
 
-    /// Takes another step of the counter, which holds in the held-out records; those.
-    fn with_counts(&mut self, chosen: Chosen) -> Pair {
-        let value = chosen.fit.values[chosen.number];
-        if let Some(profile) = self.profiles.get_mut(chosen.number) {
-            profile.value = value;
+    /// Takes other values, which hold in the held-out records; those.
+    fn with_values(&mut self, chosen: Chosen) -> Pair {
+        for (profile, value) in self.profiles.iter_mut().zip(&chosen.fit.values) {
+            profile.value = *value;
             let [low, high] = profile.interval;
-            profile.interval = [low.min(value), high.max(value)];
+            profile.interval = [low.min(*value), high.max(*value)];
         }
         self.attribution.best = Some(chosen.fit);
         self.named = named(&self.attribution, &self.profiles);
@@ -363,7 +362,7 @@ fn intervals(
 fn prepared(train: Vec<Record>, base: &Model, work: &Work) -> (Problem, State, Vec<Outlier>) {
     let mut problem = Problem::new(train, base.clone());
     problem.work = work.clone();
-    let mut null = State::settle(&problem, base, &problem.first_starts(), None);
+    let mut null = State::settle(&problem, base, &problem.first_starts(base), None);
     if sides::leave_out(&mut problem, &null) {
         null = State::settle(&problem, base, &null.starts, None);
     }

@@ -175,7 +175,7 @@ pub(super) const C_DERATING: Cause = Cause {
             "capacitance that falls with voltage",
             &[
                 knob("derating", &["capacitor.derating"], Reach::Share(0.0, 1.0, 0.1)),
-                knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 5.0, 0.1)),
+                knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.2, 5.0, 0.1)),
             ],
             // at the output's voltage the last four leave .76, .63, .48 and .30, as far apart as those of another part
             Search::From(&[
@@ -193,8 +193,8 @@ pub(super) const C_DERATING: Cause = Cause {
         searched(
             "capacitance that falls with voltage from another one at none",
             &[
-                knob("derating", &["capacitor.derating"], Reach::Share(0.3, 1.0, 0.1)),
-                knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 2.0, 0.1)),
+                knob("derating", &["capacitor.derating"], Reach::Share(0.15, 1.0, 0.1)),
+                knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.2, 2.0, 0.1)),
                 knob("capacitance", &["converter.capacitance"], Reach::Own(0.3, 3.0, 0.02)),
             ],
             // in all they leave .42, .64, .84, 1 and 1.15 of the model's at the output's voltage, twice with a slope as steep as ceramics have
@@ -212,7 +212,7 @@ pub(super) const C_DERATING: Cause = Cause {
 pub(super) const CORE_LOSS: Cause = Cause {
     id: "core_loss",
     kind: Kind::Part,
-    forms: &[form(
+    forms: &[searched(
         "conductance across the inductance",
         &[knob(
             "core_conductance",
@@ -221,5 +221,7 @@ pub(super) const CORE_LOSS: Cause = Cause {
             // that loses the same conducts three times as much
             Reach::Conductance(0.3, 0.001),
         )],
+        // at none the response of a current that rests has a corner
+        Search::OwnOr(&[&[15.0]]),
     )],
 };

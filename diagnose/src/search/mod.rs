@@ -1,6 +1,7 @@
 //! The search for a set of causes: forward with several leaders, exchange, backward, and what would do as well.
 
 mod edges;
+mod fewer;
 mod forms;
 mod replaced;
 mod singles;
@@ -367,43 +368,6 @@ impl Searcher<'_> {
         let places = self.fitter.places(&fit.causes);
         let of = |(place, value): (&(usize, usize), &f64)| kept.contains(&place.0).then_some(*value);
         places.iter().zip(&fit.values).filter_map(of).collect()
-    }
-
-    /// Drops what is not needed; the evidence of what is.
-    pub fn backward(&self, fit: Fit) -> (Option<Fit>, Vec<f64>) {
-        let mut best = fit;
-        loop {
-            let members: Vec<usize> = (0..best.causes.len()).collect();
-            let fewer: Vec<Option<Fit>> = parallel::map(&members, |member| {
-                let kept = without(&best.causes, *member);
-                let values = self.values_of(&best, &kept);
-                (!kept.is_empty()).then(|| self.fitter.from(&kept, &values, self.fitter.null))
-            });
-            let chi2 = |fit: &Option<Fit>| fit.as_ref().map_or(self.fitter.null.chi2, |fit| fit.state.chi2);
-            let inflation = self.inflation(&best);
-            let evidence = fewer.iter().enumerate().map(|(member, fit)| {
-                let lost = chi2(fit) - best.state.chi2;
-                let without = fit.as_ref().map_or(self.fitter.null, |fit| &fit.state);
-                let parameters = self.fitter.places(&best.causes[member..=member]).len();
-                match self.stands_for_edges(without, &best) {
-                    // what the trim takes over in its place is more than it may
-                    true => lost.max(threshold(parameters, inflation)),
-                    false => lost,
-                }
-            });
-            let evidence: Vec<f64> = evidence.collect();
-            let weakest = members.iter().min_by(|a, b| evidence[**a].total_cmp(&evidence[**b]));
-            let tiny = members.iter().find(|member| self.is_tiny(&best, **member));
-            let Some(weakest) = tiny.or(weakest).copied() else {
-                return (None, Vec::new());
-            };
-            let parameters = self.fitter.places(&best.causes[weakest..=weakest]).len();
-            let needed = threshold(parameters, inflation);
-            match (&fewer[weakest], tiny.is_some() || evidence[weakest] < needed) {
-                (Some(fewer), true) => best = fewer.clone(),
-                _ => return (Some(best), evidence),
-            }
-        }
     }
 }
 

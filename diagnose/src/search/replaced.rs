@@ -18,7 +18,7 @@ impl Searcher<'_> {
         stage: &str,
     ) -> Vec<Fit> {
         let kept = without(&fit.causes, member);
-        let kept = self.fitter.from(&kept, &self.values_of(fit, &kept), self.fitter.null);
+        let kept = self.with_fewer(&kept, &self.values_of(fit, &kept), &fit.state);
         let columns = self.sensitivities(&kept.causes, &kept.state);
         let set = Set::of(&kept, &columns);
         let looks = self.looks(&set, &self.others(&fit.causes), &kept.state);

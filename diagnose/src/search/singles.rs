@@ -12,6 +12,10 @@ const BROUGHT_TO_AN_END: usize = 10;
 /// Mean square over that of the noise from which on the best single cause leaves structure for sure, in `shape` from 2.5 on.
 const STILL_FAR: f64 = 4.0;
 
+/// ... and from which on there is something left that a filter behind a resistance may explain: of a hundred rows noise alone is a quarter above its
+/// mean once in a hundred records.
+const STILL_OFF: f64 = 1.25;
+
 /// Share of the resistance that fits alone which an input filter behind it has at least: alone it does what the capacitor's resistance does, too,
 /// which in filters of blind cases took up to .61 of it. A convention below that.
 const KEPT: f64 = 0.2;
@@ -67,7 +71,7 @@ impl Searcher<'_> {
         let is_simple = |fit: &&Fit| self.same(fit.causes[0], cause) && fit.values.len() == 1 && fit.values[0] > 0.0;
         let simple = fits.iter().find(is_simple)?;
         let (null, left) = (self.fitter.null.chi2, simple.state.chi2);
-        if null - left < FOLLOWED * null || left < STILL_FAR * self.fitter.problem.count() as f64 {
+        if null - left < FOLLOWED * null || left < STILL_OFF * self.fitter.problem.count() as f64 {
             return None;
         }
         let bases = &self.fitter.problem.bases;

@@ -78,6 +78,27 @@ impl Draft {
         here.iter().zip(&there).map(|(a, b)| (a - b) * (a - b)).sum()
     }
 
+    /// [`Draft::distance`] of one channel, less what another gain and offset of its instrument would explain of it.
+    pub fn beside_calibration(&self, other: &World, channel: usize) -> f64 {
+        let trained = || self.programs.iter().filter(|program| !program.heldout);
+        let there: Vec<f64> = trained()
+            .flat_map(|program| exact(other, program, &mut Rng::new(0, &[])).values[channel].clone())
+            .collect();
+        let tables = self
+            .exact
+            .iter()
+            .zip(&self.programs)
+            .filter(|(_, program)| !program.heldout);
+        let here: Vec<f64> = tables.flat_map(|(table, _)| table.values[channel].clone()).collect();
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+        let (x, y) = (mean(&there), mean(&here));
+        let pairs = || there.iter().zip(&here).map(|(a, b)| (a - x, b - y));
+        let (cross, own) = pairs().fold((0.0, 0.0), |(cross, own), (a, b)| (cross + a * b, own + a * a));
+        let slope = if own > 0.0 { cross / own } else { 0.0 };
+        let left: f64 = pairs().map(|(a, b)| (b - slope * a).powi(2)).sum();
+        left / self.floors()[channel].powi(2)
+    }
+
     /// Every listed cause fitted to the noise-free training records.
     pub fn rivals(&self, floors: &[f64; 6]) -> Vec<Rival> {
         let all: Vec<Variant> = variants(&self.design);

@@ -240,8 +240,10 @@ fn disturbed(name: Name, id: &'static str, options: Options, random: &mut Rng) -
     let mut others = draft.floors();
     others[channel] = f64::INFINITY;
     let by_cause = draft.distance(&design.world, &others);
-    // without the disturbed channel the cause still shows, and the disturbance is no small thing
-    if by_cause < SHOWS || by_channel < 2.0 * SHOWS {
+    // without the disturbed channel the cause still shows, and the disturbance is no small thing, nor a gain or an offset by another name: of a
+    // channel that hardly moves even a cube is one
+    let is_small = by_channel < 2.0 * SHOWS || draft.beside_calibration(&alone, channel) < SHOWS;
+    if by_cause < SHOWS || is_small {
         return None;
     }
     let mut expect = named(variant.id);

@@ -307,7 +307,7 @@ fn a_coarse_converter_that_shows_one_value_is_no_wrong_source() {
     }
     let problem = Problem::new(records, Model::new(&model()));
     let base = problem.base.clone();
-    let state = State::settle(&problem, &base, &problem.first_starts(), None);
+    let state = State::settle(&problem, &base, &problem.first_starts(&base), None);
     let sigma = diagnose::noise::sigma(&problem, &state.residual)[3];
     let rows = problem.records.iter().map(|r| r.rows()).sum::<usize>() as f64;
     // all rows together say about as much as one
@@ -323,7 +323,7 @@ fn a_slow_sensor_costs_nothing_where_a_record_begins() {
     let mut problem = Problem::new(LARGE.records(&slow, 11), Model::new(&slow));
     problem.sigma = [0.1, 0.05, 0.05, f64::INFINITY];
     let base = problem.base.clone();
-    let state = State::settle(&problem, &base, &problem.first_starts(), None);
+    let state = State::settle(&problem, &base, &problem.first_starts(&base), None);
     let mean = state.chi2 / problem.count() as f64;
     assert!((0.9..1.1).contains(&mean), "{mean}");
 }

@@ -5,7 +5,7 @@
 
 mod bench;
 
-use bench::{Bench, Noise, Table, Wiring, of};
+use bench::{Bench, Noise, Table, Wiring, at, integrate, of};
 use diagnose::diagnosis::diagnose;
 use diagnose::findings::{Findings, Verdict};
 use plant::{Carrier, Parameters};
@@ -143,4 +143,78 @@ fn a_record_that_begins_at_the_peak_of_a_ripple_is_consistent() {
         let healthy = found(&model(&bench), &table);
         assert_eq!(healthy.verdict, Verdict::Consistent, "{first}: {}", healthy.sentence);
     }
+}
+
+const CORE: &str = "[converter]\nv_in = 48.0\ninductance = 47e-6\ncapacitance = 100e-6\nf_sw = 100e3\n\
+                    [inductor]\ndcr = 0.05\n[capacitor]\nesr = 0.02\n[switch]\nr_ds_on = 0.04\nv_f = 0.6\nr_d = 0.02\n\
+                    [pwm]\nsampling_phase = 0.2\n";
+
+/// A conductance across the inductance of a buck that rests in each period: what it draws flows through the leg beside the inductor's
+/// current, and the diode ends both. `(row, duty, ohm)` from rows on.
+fn lossy(core: f64, course: &[(usize, f64, f64)], seed: u64) -> Table {
+    const H: f64 = 10e-6;
+    // current of the leg, and voltage across the inductance
+    let leg = |x: [f64; 2], is_on: bool, ohm: f64| {
+        let (source, r) = if is_on { (48.0, 0.09) } else { (-0.6, 0.07) };
+        // out = (v + esr i) / (1 + esr / ohm), i = x + core across, across = source - r i - out
+        let share = 1.0 / (1.0 + 0.02 / ohm);
+        let across = (source - share * x[1] - (r + share * 0.02) * x[0]) / (1.0 + core * (r + share * 0.02));
+        [x[0] + core * across, across]
+    };
+    let out = |x: [f64; 2], i: f64, ohm: f64| (x[1] + 0.02 * i) / (1.0 + 0.02 / ohm);
+    let (mut x, mut random) = ([0.0, 24.0], Noise(seed));
+    let mut table = Table::of(&["t", "duty", "v_out", "i_l", "r_load"]);
+    for row in -3000..260isize {
+        let (_, duty, ohm) = *at(course, row, |step| step.0);
+        // sampled while the switch is on
+        for (is_on, share, shows) in [(true, 0.2, true), (true, duty - 0.2, false), (false, 1.0 - duty, false)] {
+            let mut rests = false;
+            for _ in 0..120 {
+                integrate(&mut x, share * H / 120.0, 1, |x| {
+                    let [i, across] = if rests { [0.0; 2] } else { leg(x, is_on, ohm) };
+                    [across / 47e-6, (i - out(x, i, ohm) / ohm) / 100e-6]
+                });
+                if !is_on && leg(x, is_on, ohm)[0] <= 0.0 {
+                    (rests, x[0]) = (true, 0.0);
+                }
+            }
+            if shows && row >= 0 {
+                let i = leg(x, is_on, ohm)[0];
+                table.push(&[
+                    (row as f64 + 0.2) * H,
+                    duty,
+                    out(x, i, ohm) + 5e-3 * random.normal(),
+                    i + 5e-3 * random.normal(),
+                    ohm,
+                ]);
+            }
+        }
+    }
+    table
+}
+
+/// 20 V and 28 V across 0.75 millisiemens, for half of a period together, are 0.22 W of 9 W.
+#[test]
+fn a_core_s_loss_is_among_what_is_named_where_the_current_rests() {
+    let model = Parameters::from_toml("plant.toml".as_ref(), CORE).unwrap();
+    let courses: [&[(usize, f64, f64)]; 2] = [
+        &[(0, 0.3, 70.0), (90, 0.3, 110.0), (180, 0.3, 55.0)],
+        &[(0, 0.28, 80.0), (70, 0.34, 80.0), (140, 0.26, 80.0), (200, 0.31, 80.0)],
+    ];
+    let of = |core: f64| {
+        let tables = [0, 1].map(|n| lossy(core, courses[n], 81 + n as u64));
+        let records = tables.iter().zip(["load", "duty"]);
+        let records = records.map(|(table, name)| table.read(name, &model).unwrap());
+        let findings = diagnose(&model, records.collect(), &[], &|_| ()).findings;
+        println!("{:?}: {}", findings.verdict, findings.sentence);
+        findings
+    };
+    let healthy = of(0.0);
+    assert_eq!(healthy.verdict, Verdict::Consistent, "{}", healthy.sentence);
+    let findings = of(7.5e-4);
+    let names = findings
+        .causes
+        .iter()
+        .flat_map(|cause| cause.rivals.iter().flatten().copied().chain([cause.id]));
+    assert!(names.into_iter().any(|id| id == "core_loss"), "{}", findings.sentence);
 }

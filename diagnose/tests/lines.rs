@@ -44,7 +44,7 @@ fn table(rows: usize, dither: (f64, &[f64]), changed: &Bench, random: &mut Noise
 fn seen(table: &Table) -> usize {
     let base = Model::new(&model());
     let mut problem = Problem::new(vec![table.read("run", &model()).unwrap()], base.clone());
-    let null = State::settle(&problem, &base, &problem.first_starts(), None);
+    let null = State::settle(&problem, &base, &problem.first_starts(&base), None);
     problem.sigma = noise::sigma(&problem, &null.residual);
     let null = State::settle(&problem, &base, &null.starts, None);
     let found = fast::structures(&problem, &null, &null);

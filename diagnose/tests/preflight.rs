@@ -56,7 +56,7 @@ fn said(table: &Table) -> String {
     let base = Model::new(&model());
     let repairs = record.repairs.join("\n");
     let mut problem = Problem::new(vec![record], base.clone());
-    let null = State::settle(&problem, &base, &problem.first_starts(), None);
+    let null = State::settle(&problem, &base, &problem.first_starts(&base), None);
     problem.sigma = noise::sigma(&problem, &null.residual);
     let null = State::settle(&problem, &base, &null.starts, None);
     let mut all = vec![repairs];

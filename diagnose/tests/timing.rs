@@ -136,7 +136,7 @@ fn samples_a_period_and_more_too_old_are_the_sampling_instant() {
 fn looked(table: &Table, plant: &Parameters) -> Option<Timing> {
     let base = Model::new(plant);
     let mut problem = Problem::new(vec![table.read("run", plant).unwrap()], base.clone());
-    let null = State::settle(&problem, &base, &problem.first_starts(), None);
+    let null = State::settle(&problem, &base, &problem.first_starts(&base), None);
     problem.sigma = noise::sigma(&problem, &null.residual);
     let null = State::settle(&problem, &base, &null.starts, None);
     timing::of(&problem, &null)

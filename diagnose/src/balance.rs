@@ -81,8 +81,8 @@ const NUDGE: f64 = 1e-4;
 const OF_COUNTER: f64 = 1.0 / 3.0;
 /// Fewest points beyond the terms.
 const MORE_FOR_COUNTER: usize = 12;
-/// Counts beyond which none is sought: half a step is the accuracy of ideal edges ([`crate::problem::duty_accuracy`]), and tens of thousands would take
-/// seconds.
+/// Counts beyond which none is sought: half a step of half as many is the accuracy of ideal edges ([`crate::problem::duty_accuracy`]), and tens of
+/// thousands would take seconds.
 const MOST_COUNTS: f64 = 2000.0;
 /// Most points that are asked: of thousands each count would cost as much as a simulation.
 const ASKED: usize = 64;

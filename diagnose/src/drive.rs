@@ -133,9 +133,7 @@ pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>
         }
     }
     let longer = trimmed(&mut p, begin.trim);
-    let instant = record.phase + model.late / p.t_sw();
-    let mut whole = (instant + SAME).floor();
-    let mut phase = instant - whole;
+    let (mut whole, mut phase) = sampled(record, model.late / p.t_sw());
     if phase.abs() < SAME {
         phase = 0.0;
     }
@@ -187,6 +185,14 @@ pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>
     (shown, ran)
 }
 
+/// Whole periods by which the samples of a record are late, and the phase of the period in which they lie, when they are taken `late` periods later
+/// than the record says.
+fn sampled(record: &Record, late: f64) -> (f64, f64) {
+    let instant = record.phase + late;
+    let whole = (instant + SAME).floor();
+    (whole, instant - whole)
+}
+
 /// Rows of a segment in which a sensor shows what no model tells, since nobody knows what was before a record and what came behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Unseen {
@@ -215,7 +221,7 @@ impl Unseen {
         } else {
             model.late
         };
-        let whole = (record.phase + late / p.t_sw() + SAME).floor() as isize;
+        let whole = sampled(record, late / p.t_sw()).0 as isize;
         Self {
             begin: std::array::from_fn(|_| match channels.next() {
                 Some((sensor, false)) if sensor.delay > 0.0 => 1 + (sensor.delay / p.t_sw()) as usize,

@@ -18,7 +18,7 @@ use crate::record::Record;
 use crate::search::TIE;
 use crate::words::si;
 
-/// Values that are tried of a number that is no step: a quarter of a standard deviation apart where the interval is a normal one's.
+/// Values that are tried of a number that is no step: a third of a standard deviation apart where the interval is a normal one's.
 const VALUES: usize = 24;
 /// Steps that are tried. Between two of them a few held-out duties may be rounded in a way that is not tried. A convention that trades time.
 const MOST_TRIED: usize = 48;

@@ -5,7 +5,7 @@
 
 mod bench;
 
-use bench::{Bench, Noise, Table, at, integrate, of};
+use bench::{Bench, Noise, Table, at, integrate, named, of};
 use diagnose::diagnosis::diagnose;
 use diagnose::findings::{Findings, Verdict};
 use plant::{Carrier, Parameters};
@@ -146,15 +146,6 @@ fn behind_lost_rows_a_load_of_constant_power_is_still_on_its_way() {
         table.read(["first", "second"][n], &model).unwrap()
     });
     consistent(&diagnose(&model, records.collect(), &[], &|_| ()).findings);
-}
-
-/// Names of the causes and of all that would do in their place.
-fn named(findings: &Findings) -> Vec<&str> {
-    let rivals = findings.causes.iter().flat_map(|cause| cause.rivals.iter().flatten());
-    rivals
-        .copied()
-        .chain(findings.causes.iter().map(|cause| cause.id))
-        .collect()
 }
 
 fn found(model: &Parameters, tables: &[Table]) -> Findings {

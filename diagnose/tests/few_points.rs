@@ -4,7 +4,7 @@
 
 mod bench;
 
-use bench::{Noise, Table};
+use bench::{Noise, Table, named};
 use diagnose::diagnosis::diagnose;
 use diagnose::findings::{Findings, Verdict};
 use plant::Parameters;
@@ -15,15 +15,6 @@ fn found(text: &str, table: &Table) -> Findings {
     let findings = diagnose(&model, vec![record], &[], &|_| ()).findings;
     println!("{:?}: {}", findings.verdict, findings.sentence);
     findings
-}
-
-/// Names of the causes and of all that would do in their place.
-fn named(findings: &Findings) -> Vec<&str> {
-    let rivals = findings.causes.iter().flat_map(|cause| cause.rivals.iter().flatten());
-    rivals
-        .copied()
-        .chain(findings.causes.iter().map(|cause| cause.id))
-        .collect()
 }
 
 const V_IN: f64 = 350.0;

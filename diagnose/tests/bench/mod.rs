@@ -8,10 +8,20 @@ pub mod control;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use diagnose::findings::Findings;
 use diagnose::record::Record;
 use measured::{ColumnMap, Sheet};
 use plant::Parameters;
 use toml_input::Faults;
+
+/// Names of the causes and of all that would do in their place.
+pub fn named(findings: &Findings) -> Vec<&str> {
+    let rivals = findings.causes.iter().flat_map(|cause| cause.rivals.iter().flatten());
+    rivals
+        .copied()
+        .chain(findings.causes.iter().map(|cause| cause.id))
+        .collect()
+}
 
 /// Moves `x` by `steps` steps of `h` s, by Runge and Kutta's method of the fourth order.
 pub fn integrate<const N: usize>(x: &mut [f64; N], h: f64, steps: usize, slope: impl Fn([f64; N]) -> [f64; N]) {

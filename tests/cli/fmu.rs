@@ -220,9 +220,9 @@ fn a_transfer_to_an_fmu_says_what_cannot_be_known() {
 fn a_training_runs_on_an_fmu() {
     let desk = desk();
     desk.edit("train/paper12.toml", "../plants/paper-model.toml", "../plant.toml");
-    desk.edit("train/paper12.toml", "steps = 20000 ", "steps = 600 ");
+    desk.edit("train/paper12.toml", "steps = 100000 ", "steps = 600 ");
     desk.edit("train/paper12.toml", "seeds = [0, 1, 2, 3, 4]", "seeds = [3, 4]");
-    desk.edit("train/paper12.toml", "every = 40\n", "every = 300\n");
+    desk.edit("train/paper12.toml", "every = 100\n", "every = 300\n");
     desk.refuse(
         "train train/paper12.toml --out trained",
         &["foreign native code", "--run-fmu"],

@@ -7,6 +7,7 @@ use crate::fast;
 use crate::findings::{Evidence, Named, Value, Verdict};
 use crate::fit::State;
 use crate::gain::{self, Pair};
+use crate::held_table;
 use crate::instants;
 use crate::left_open::{self, Chosen};
 use crate::noise::{self, Outlier};
@@ -255,7 +256,7 @@ impl Examined {
         self.verdict = verdict(&self.named, &self.read_off, holds);
     }
 
-    /// Whether the causes explain the training records, and nothing but the held-out ones speaks against them.
+    /// Whether the causes, or the model as given, explain the training records, and nothing but the held-out ones speaks against them.
     pub fn fits_training_alone(&self) -> bool {
         let is_held_out = |doubt: &Doubt| matches!(doubt, Doubt::HeldOut(..));
         self.structure.is_empty() && !self.doubts.is_empty() && self.doubts.iter().all(is_held_out)
@@ -266,6 +267,14 @@ impl Examined {
         let found = self.attribution.state();
         let trim = found.starts.trim_or_none(base.plant.converter.f_sw);
         let pair = held(&self.problem, heldout, base, found, trim)?;
+        if self.verdict == Verdict::Consistent {
+            let far = held_table::far(&pair);
+            if !far.is_empty() {
+                self.verdict = Verdict::Unexplained;
+            }
+            let far = far.into_iter().map(|(channels, words)| Doubt::HeldOut(channels, words));
+            self.doubts.extend(far);
+        }
         // what is no more than the step of a converter has no values that could fail to hold
         if self.verdict == Verdict::Explained && !self.named.is_empty() {
             let causes = self.attribution.best.iter().flat_map(|best| &best.causes);

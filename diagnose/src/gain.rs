@@ -5,6 +5,7 @@ use plant::Rectifier;
 
 use crate::drive::Model;
 use crate::fit::State;
+use crate::held_table;
 use crate::ideal::{self, Ideal};
 use crate::instants;
 use crate::level::ACCURACY;
@@ -321,7 +322,8 @@ impl Pair {
     }
 
     /// Channels of a record, with words, in which the extended model leaves much more than in the training records, though none of it is
-    /// the same throughout, as a sensor that has shifted would leave: what was found does not hold there.
+    /// the same throughout, as a sensor that has shifted would leave: what was found does not hold there. Tables of settled points are
+    /// judged by [`held_table`].
     #[must_use]
     pub fn doubts(&self, training: &Problem, at: &State, of_curve: bool) -> Vec<(Vec<usize>, String)> {
         let accuracy = if of_curve { OF_CURVE } else { ACCURACY };
@@ -339,14 +341,13 @@ impl Pair {
             after.lag1.abs() > RELATED && after.square > MUCH_WORSE * usual + accuracy * accuracy * before.square
         };
         let more: Vec<&Shift> = shifts.iter().filter(is_more).collect();
-        more.chunk_by(|one, other| one.index == other.index)
-            .map(|of_record| {
-                (
-                    of_record.iter().map(|shift| shift.number).collect(),
-                    not_there(of_record),
-                )
-            })
-            .collect()
+        let of_records = more.chunk_by(|one, other| one.index == other.index).map(|of_record| {
+            (
+                of_record.iter().map(|shift| shift.number).collect(),
+                not_there(of_record),
+            )
+        });
+        of_records.chain(held_table::far(self)).collect()
     }
 
     /// Records that the extended model does not fit as it fits the training records; `training` are the training records at that model.
@@ -355,12 +356,7 @@ impl Pair {
         let mut list = Vec::new();
         let ideal = Ideal::at(&self.problem.base.plant, 1.0);
         for (index, record) in self.problem.records.iter().enumerate() {
-            // where power alone is drawn, small errors grow: they say nothing about the bench
-            let unstable = record.load.iter().zip(&record.duty).any(|(load, d)| {
-                let v = ideal.volts(*d);
-                load.power > load.conductance * v * v
-            });
-            if record.settled || unstable {
+            if record.settled || held_table::is_unstable(record, &ideal) {
                 continue;
             }
             for n in 0..CHANNELS {

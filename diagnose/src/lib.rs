@@ -41,6 +41,7 @@ pub mod findings;
 pub mod fit;
 mod flicker;
 pub mod gain;
+mod held_table;
 pub mod ideal;
 mod instants;
 mod left_open;

@@ -13,7 +13,7 @@ use report::{Axis, BarChart, BarPanel, Chart, Page, Panel, ReportError, Section,
 
 use self::colours::{EXTENDED, MODEL};
 use crate::diagnosis::Diagnosis;
-use crate::findings::{Named, Verdict};
+use crate::findings::{Findings, Named, Verdict};
 use crate::gain::{Pair, Regime, Shift};
 use crate::next;
 use crate::noise::channel;
@@ -112,6 +112,11 @@ fn headline(diagnosis: &Diagnosis, list: &[comparison::Compared]) -> String {
     }
 }
 
+/// Whether neither a cause nor anything that is left is told.
+fn has_nothing(findings: &Findings) -> bool {
+    findings.partial.is_empty() && findings.set_aside.is_none() && findings.structure.is_empty()
+}
+
 fn causes(diagnosis: &Diagnosis) -> Section {
     let findings = &diagnosis.findings;
     let table = |caption: &str, list: &[Named]| {
@@ -154,7 +159,7 @@ fn causes(diagnosis: &Diagnosis) -> Section {
             "Evidence is the chi-square lost without the cause, over the scatter of the noise.",
             &findings.causes,
         ));
-    } else if findings.verdict == Verdict::Consistent {
+    } else if findings.verdict == Verdict::Consistent || has_nothing(findings) {
         section = section.text("Nothing.");
     }
     if !findings.partial.is_empty() {

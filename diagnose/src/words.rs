@@ -38,7 +38,11 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>, left:
             };
             if found.fits_training_alone() {
                 let doubts = doubts::said(&found.doubts).join("; ");
-                return format!("What explains the training records does not hold in what was held out: {doubts}.");
+                let what = match found.named.is_empty() {
+                    true => "The model as given explains the training records within their noise, and not",
+                    false => "What explains the training records does not hold in",
+                };
+                return format!("{what} what was held out: {doubts}.");
             }
             // a fault of the bench first: it is what the reader can mend
             let (bench, others): (Vec<Doubt>, Vec<Doubt>) =
@@ -244,6 +248,8 @@ pub fn nearest(partial: &[Named], removed: f64, fits_training: bool, left: &[Str
     };
     let list: Vec<String> = partial.iter().map(one).collect();
     match list.is_empty() {
+        // nothing is left of the training records that a cause could take away
+        true if fits_training => String::new(),
         true => " No cause takes away a part of it that is more than noise.".to_owned(),
         // "takes away 100 %" and "no explanation" in one sentence: what speaks against it has been said before
         false if fits_training => format!(

@@ -126,3 +126,38 @@ fn a_load_that_draws_more_than_it_says_is_not_consistent() {
         assert_ne!(findings.verdict, Verdict::Consistent, "{seed}: {}", findings.sentence);
     }
 }
+
+/// Settled points that no fit has seen, of the converter as it is, or with the measured columns of one row beside the settings of another.
+fn held_out(is_moved: bool) -> Findings {
+    let model = Parameters::from_toml("plant.toml".as_ref(), DIODE).unwrap();
+    let read = |name: &str, table: &Table| table.read(name, &model).unwrap();
+    let (train, _) = behind_a_diode(V_F, 3);
+    let mut random = Noise(11);
+    let mut held = Table::of(&["duty", "v_out", "i_l", "r_load"]);
+    let settings: Vec<(f64, f64)> = (0..8)
+        .map(|n| (0.3 + 0.02 * f64::from(n), 40.0 + 25.0 * f64::from(n * 3 % 8)))
+        .collect();
+    for (row, (duty, ohm)) in settings.iter().enumerate() {
+        let measured = settings[if is_moved { (row + 5) % 8 } else { row }];
+        let (v, i, _) = point(measured.0, measured.1, V_F);
+        held.push(&[*duty, v + 0.03 * random.normal(), i + 4e-3 * random.normal(), *ohm]);
+    }
+    let found = diagnose(&model, vec![read("train", &train)], &[read("held", &held)], &|_| ());
+    println!("{:?}: {}", found.findings.verdict, found.findings.sentence);
+    // no section of the page is a heading alone
+    let page = diagnose::page::page(&found).unwrap();
+    let (_, changes) = page.split_once("What changes in the model").unwrap();
+    assert!(changes.split_once("<h2").unwrap().0.contains("Nothing."));
+    found.findings
+}
+
+#[test]
+fn points_that_no_fit_has_seen_are_asked_too() {
+    assert_eq!(held_out(false).verdict, Verdict::Consistent);
+    let moved = held_out(true);
+    assert_eq!(moved.verdict, Verdict::Unexplained);
+    for words in ["v_o, i_l of the held-out points held", "% of the reading"] {
+        assert!(moved.sentence.contains(words), "{}", moved.sentence);
+    }
+    assert!(named(&moved).is_empty() && moved.partial.is_empty());
+}

@@ -47,3 +47,22 @@ fn a_weaker_source_gets_another_mapping_and_a_ripple_none() {
     let ripple = controlled(|p| (p.source.ripple, p.source.ripple_frequency) = (3.0, 160.0)).findings;
     assert!(!ripple.refitted && ripple.largest_change < 1e-3, "{ripple:?}");
 }
+
+#[test]
+fn a_wrong_voltmeter_gets_no_other_mapping_and_is_said() {
+    let changes: [(&str, fn(&mut Parameters)); 2] = [
+        ("gain", |p| p.sensors.v_out.gain = 0.98),
+        ("offset", |p| p.sensors.v_out.offset = -1.3),
+    ];
+    for (what, change) in changes {
+        let found = controlled(change).findings;
+        assert!(!found.refitted && found.largest_change < 1e-3, "{what}: {found:?}");
+        for course in &found.steps {
+            assert_eq!(course.before, course.after, "{what}");
+        }
+        assert!(!found.beyond_repair.is_empty(), "{what}");
+    }
+    // the source that is weaker beside it is what the mapping follows
+    let both = controlled(|p| (p.converter.v_in, p.sensors.v_out.gain) = (195.0, 0.98)).findings;
+    assert!((both.mapping_after.a - 200.0 / 195.0).abs() < 2e-3, "{both:?}");
+}

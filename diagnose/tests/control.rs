@@ -50,12 +50,9 @@ fn a_weaker_source_gets_another_mapping_and_a_ripple_none() {
 
 #[test]
 fn a_wrong_voltmeter_gets_no_other_mapping_and_is_said() {
-    let changes: [(&str, fn(&mut Parameters)); 2] = [
-        ("gain", |p| p.sensors.v_out.gain = 0.98),
-        ("offset", |p| p.sensors.v_out.offset = -1.3),
-    ];
-    for (what, change) in changes {
-        let found = controlled(change).findings;
+    let off =
+        |gain: f64, offset: f64| controlled(move |p| (p.sensors.v_out.gain, p.sensors.v_out.offset) = (gain, offset));
+    for (what, found) in [("gain", off(0.98, 0.0).findings), ("offset", off(1.0, -1.3).findings)] {
         assert!(!found.refitted && found.largest_change < 1e-3, "{what}: {found:?}");
         for course in &found.steps {
             assert_eq!(course.before, course.after, "{what}");

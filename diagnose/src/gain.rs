@@ -123,7 +123,7 @@ const SHIFT_ERRORS: f64 = 4.0;
 const STRETCHES: usize = 8;
 /// Mean square error over that of the training records from which on a record is another bench's: the errors are 1.6 times as
 /// large, as in [`crate::shape`]. A convention.
-const MUCH_WORSE: f64 = 2.5;
+pub(crate) const MUCH_WORSE: f64 = 2.5;
 /// Correlation of neighbours from which on an error is more than noise: a coarser range of the scope or a wild sample leaves none,
 /// and an error that makes a mean square of 2.5 out of one of 1 leaves 1.5 / 2.5 where it is smooth. Half of that.
 const RELATED: f64 = 0.3;

@@ -1,7 +1,7 @@
 //! Settled points that no fit has seen, beside the model. Neighbouring rows of a table are not related, and few rows tell the noise poorly: what
 //! counts is an error that no meter makes.
 
-use crate::gain::Pair;
+use crate::gain::{MUCH_WORSE, Pair};
 use crate::ideal::Ideal;
 use crate::noise;
 use crate::record::{CHANNEL_NAMES, CHANNELS, LOAD_CURRENT, Record};
@@ -9,8 +9,6 @@ use crate::record::{CHANNEL_NAMES, CHANNELS, LOAD_CURRENT, Record};
 /// Share of a channel's reading, both root mean squares, from which on an error is no meter's. A convention: meters and probes of a bench are
 /// within a few per cent of what they say.
 const GROSS: f64 = 0.1;
-/// In squares, above the noise of the training records: [`crate::gain`] takes as much for other records.
-const MUCH: f64 = 2.5;
 /// Fewest points that are told from one wrong row.
 const FEWEST: usize = 3;
 
@@ -63,5 +61,5 @@ fn share(pair: &Pair, index: usize, n: usize) -> Option<f64> {
     let square =
         |value: &dyn Fn(usize) -> f64| rows.iter().map(|row| value(*row).powi(2)).sum::<f64>() / rows.len() as f64;
     let (error, reading) = (square(&|row| errors[row]), square(&|row| record.measured[n][row]));
-    (error > MUCH && reading > 0.0).then(|| sigma * (error / reading).sqrt())
+    (error > MUCH_WORSE && reading > 0.0).then(|| sigma * (error / reading).sqrt())
 }

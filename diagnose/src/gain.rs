@@ -323,7 +323,7 @@ impl Pair {
 
     /// Channels of a record, with words, in which the extended model leaves much more than in the training records, though none of it is
     /// the same throughout, as a sensor that has shifted would leave: what was found does not hold there. Tables of settled points are
-    /// judged by [`held_table`].
+    /// judged by an error that no meter makes.
     #[must_use]
     pub fn doubts(&self, training: &Problem, at: &State, of_curve: bool) -> Vec<(Vec<usize>, String)> {
         let accuracy = if of_curve { OF_CURVE } else { ACCURACY };

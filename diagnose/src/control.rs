@@ -198,7 +198,8 @@ fn quiet(converter: &Parameters) -> Parameters {
 }
 
 /// The converter with the voltmeter of the training: no duty repairs a wrong one. A mapping that was fitted to its readings would hold these
-/// where the policy wants the voltage, and would be wrong as soon as the contract takes the error out.
+/// where the policy wants the voltage, and would be wrong as soon as the contract takes the error out. A load current that is shown wrong stays:
+/// the mapping is that of the contract as it is, whose loop reads it so.
 fn read_as_trained(converter: &Parameters, trained_on: &Parameters) -> Parameters {
     let mut read = converter.clone();
     let known = &trained_on.sensors.v_out;

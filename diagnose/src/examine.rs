@@ -6,10 +6,7 @@ use crate::drive::Model;
 use crate::fast;
 use crate::findings::{Evidence, Named, Value, Verdict};
 use crate::fit::State;
-use crate::gain::{self, Pair};
-use crate::held_table;
 use crate::instants;
-use crate::left_open::{self, Chosen};
 use crate::noise::{self, Outlier};
 use crate::preflight::{self, Misread};
 use crate::problem::Problem;
@@ -241,7 +238,7 @@ impl Examined {
     }
 
     /// What the fit and its profiles say.
-    fn answer(&mut self) {
+    pub(crate) fn answer(&mut self) {
         let (problem, attribution) = (&self.problem, &mut self.attribution);
         self.structure = structures(problem, &attribution.null, attribution.state(), attribution.inflation);
         self.lines = beside(
@@ -255,61 +252,6 @@ impl Examined {
         let holds = self.structure.is_empty() && !doubts::forbids(&self.named, &self.doubts);
         self.verdict = verdict(&self.named, &self.read_off, holds);
     }
-
-    /// Whether the causes, or the model as given, explain the training records, and nothing but the held-out ones speaks against them.
-    pub fn fits_training_alone(&self) -> bool {
-        let is_held_out = |doubt: &Doubt| matches!(doubt, Doubt::HeldOut(..));
-        self.structure.is_empty() && !self.doubts.is_empty() && self.doubts.iter().all(is_held_out)
-    }
-
-    /// Lets the held-out records judge; causes that do not hold in them explain nothing any more.
-    pub fn judged(&mut self, heldout: &[Record], base: &Model) -> Option<Pair> {
-        let found = self.attribution.state();
-        let trim = found.starts.trim_or_none(base.plant.converter.f_sw);
-        let pair = held(&self.problem, heldout, base, found, trim)?;
-        if self.verdict == Verdict::Consistent {
-            let far = held_table::far(&pair);
-            if !far.is_empty() {
-                self.verdict = Verdict::Unexplained;
-            }
-            let far = far.into_iter().map(|(channels, words)| Doubt::HeldOut(channels, words));
-            self.doubts.extend(far);
-        }
-        // what is no more than the step of a converter has no values that could fail to hold
-        if self.verdict == Verdict::Explained && !self.named.is_empty() {
-            let causes = self.attribution.best.iter().flat_map(|best| &best.causes);
-            let of_curve = causes
-                .into_iter()
-                .any(|cause| self.attribution.candidates[*cause].is_curve());
-            let fails = pair.doubts(&self.problem, found, of_curve);
-            if !fails.is_empty() {
-                let explained = (&self.attribution, &self.profiles[..]);
-                if let Some(chosen) = left_open::chosen(&self.problem, explained, heldout, base) {
-                    return Some(self.with_values(chosen));
-                }
-                self.verdict = Verdict::Unexplained;
-            }
-            self.doubts.extend(
-                fails
-                    .into_iter()
-                    .map(|(channels, words)| Doubt::HeldOut(channels, words)),
-            );
-        }
-        Some(pair)
-    }
-
-    /// Takes other values, which hold in the held-out records; those.
-    fn with_values(&mut self, chosen: Chosen) -> Pair {
-        for (profile, value) in self.profiles.iter_mut().zip(&chosen.fit.values) {
-            profile.value = *value;
-            let [low, high] = profile.interval;
-            profile.interval = [low.min(*value), high.max(*value)];
-        }
-        self.attribution.best = Some(chosen.fit);
-        self.named = named(&self.attribution, &self.profiles);
-        self.odd.push(chosen.words);
-        chosen.pair
-    }
 }
 
 /// Lines in channels that hold nothing else: what is slow has been said already.
@@ -319,11 +261,6 @@ fn beside(mut lines: Vec<Structure>, structure: &[Structure]) -> Vec<Structure> 
         !structure.iter().any(same)
     });
     lines
-}
-
-/// The held-out records with the model as given and with `state`, if there are any.
-pub fn held(problem: &Problem, heldout: &[Record], base: &Model, state: &State, trim: f64) -> Option<Pair> {
-    (!heldout.is_empty()).then(|| gain::hold(heldout, base, &state.model, problem.sigma, trim))
 }
 
 /// How well the data hold the parameters; other pairs of causes become rivals. What leaves structure explains nothing, and its
@@ -389,7 +326,7 @@ fn prepared(train: Vec<Record>, base: &Model, work: &Work) -> (Problem, State, V
     (problem, null, outliers)
 }
 
-fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
+pub(crate) fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
     let Some(best) = &attribution.best else {
         return Vec::new();
     };

@@ -5,13 +5,11 @@ use plant::Rectifier;
 
 use crate::drive::Model;
 use crate::fit::State;
-use crate::held_table;
 use crate::ideal::{self, Ideal};
 use crate::instants;
-use crate::level::ACCURACY;
 use crate::noise;
 use crate::problem::{Problem, Starts, dot};
-use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, LOAD_CURRENT, Record};
+use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Record};
 use crate::sampling;
 use crate::sides;
 use crate::unsure_levels;
@@ -124,9 +122,6 @@ const STRETCHES: usize = 8;
 /// Mean square error over that of the training records from which on a record is another bench's: the errors are 1.6 times as
 /// large, as in [`crate::shape`]. A convention.
 pub(crate) const MUCH_WORSE: f64 = 2.5;
-/// Correlation of neighbours from which on an error is more than noise: a coarser range of the scope or a wild sample leaves none,
-/// and an error that makes a mean square of 2.5 out of one of 1 leaves 1.5 / 2.5 where it is smooth. Half of that.
-const RELATED: f64 = 0.3;
 
 /// A held-out record with both simulations, for pictures.
 #[derive(Debug, Clone)]
@@ -271,10 +266,6 @@ fn other_chains(problem: &mut Problem, base: &Model, extended: &Model, trim: f64
     remarks
 }
 
-/// What the law of a part's curve may be off by where no fit has been, as a share of what the part does: another law is met within 3 % of the
-/// capacitance where records have been (`tests/ceramic.rs`), and a blind case left 1.2 % of the error beyond.
-const OF_CURVE: f64 = 0.03;
-
 impl Pair {
     /// Errors of each record, channel and regime.
     #[must_use]
@@ -321,42 +312,13 @@ impl Pair {
         })
     }
 
-    /// Channels of a record, with words, in which the extended model leaves much more than in the training records, though none of it is
-    /// the same throughout, as a sensor that has shifted would leave: what was found does not hold there. Tables of settled points are
-    /// judged by an error that no meter makes.
-    #[must_use]
-    pub fn doubts(&self, training: &Problem, at: &State, of_curve: bool) -> Vec<(Vec<usize>, String)> {
-        let accuracy = if of_curve { OF_CURVE } else { ACCURACY };
-        let shifts = self.shifts(training, at);
-        let is_more = |shift: &&Shift| {
-            let (index, n) = (shift.index, shift.number);
-            // the current that is the load says nothing about the converter
-            if shift.throughout || n == LOAD_CURRENT && self.problem.records[index].metered.is_some() {
-                return false;
-            }
-            let before = noise::left(&noise::channel(&self.problem, &self.before.residual, index, n));
-            let after = noise::left(&noise::channel(&self.problem, &self.after.residual, index, n));
-            // a simulator that is off by its accuracy leaves that share of what was there, in squares, as in `shape`
-            let usual = after.square / (shift.ratio * shift.ratio);
-            after.lag1.abs() > RELATED && after.square > MUCH_WORSE * usual + accuracy * accuracy * before.square
-        };
-        let more: Vec<&Shift> = shifts.iter().filter(is_more).collect();
-        let of_records = more.chunk_by(|one, other| one.index == other.index).map(|of_record| {
-            (
-                of_record.iter().map(|shift| shift.number).collect(),
-                not_there(of_record),
-            )
-        });
-        of_records.chain(held_table::far(self)).collect()
-    }
-
     /// Records that the extended model does not fit as it fits the training records; `training` are the training records at that model.
     #[must_use]
     pub fn shifts(&self, training: &Problem, at: &State) -> Vec<Shift> {
         let mut list = Vec::new();
         let ideal = Ideal::at(&self.problem.base.plant, 1.0);
         for (index, record) in self.problem.records.iter().enumerate() {
-            if record.settled || held_table::is_unstable(record, &ideal) {
+            if record.settled || ideal.is_unstable_with(record) {
                 continue;
             }
             for n in 0..CHANNELS {
@@ -424,23 +386,4 @@ fn is_in(regime: Regime, problem: &Problem, record: &Record, row: usize) -> bool
         Regime::Discontinuous => is_discontinuous,
         Regime::Transient => !record.settled && (row.saturating_sub(TRANSIENT).max(1)..=row).any(moved),
     }
-}
-
-/// Said of channels of one record.
-fn not_there(of_record: &[&Shift]) -> String {
-    let Some(first) = of_record.first() else {
-        return String::new();
-    };
-    let channels: Vec<&str> = of_record.iter().map(|shift| shift.channel).collect();
-    let (are, up_to) = match channels.len() {
-        1 => ("is", ""),
-        _ => ("are", "up to "),
-    };
-    let ratio = of_record.iter().map(|shift| shift.ratio).fold(0.0, f64::max);
-    format!(
-        "{} of the held-out record {} {are} {up_to}{ratio:.1} times as far from the model with these causes as the training records: \
-         they do not hold there",
-        channels.join(", "),
-        first.record
-    )
 }

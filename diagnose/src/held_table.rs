@@ -4,7 +4,7 @@
 use crate::gain::{MUCH_WORSE, Pair};
 use crate::ideal::Ideal;
 use crate::noise;
-use crate::record::{CHANNEL_NAMES, CHANNELS, LOAD_CURRENT, Record};
+use crate::record::{CHANNEL_NAMES, CHANNELS, LOAD_CURRENT};
 
 /// Share of a channel's reading, both root mean squares, from which on an error is no meter's. A convention: meters and probes of a bench are
 /// within a few per cent of what they say.
@@ -12,19 +12,11 @@ const GROSS: f64 = 0.1;
 /// Fewest points that are told from one wrong row.
 const FEWEST: usize = 3;
 
-/// Whether power alone is drawn somewhere, beyond what holds the voltage: small errors grow there, and say nothing about the bench.
-pub(crate) fn is_unstable(record: &Record, ideal: &Ideal) -> bool {
-    record.load.iter().zip(&record.duty).any(|(load, duty)| {
-        let v = ideal.volts(*duty);
-        load.power > load.conductance * v * v
-    })
-}
-
 /// The channels of each table in which the model is beside its points by more than any meter is, with words.
 pub(crate) fn far(pair: &Pair) -> Vec<(Vec<usize>, String)> {
     let ideal = Ideal::at(&pair.problem.base.plant, 1.0);
     let tables = pair.problem.records.iter().enumerate();
-    let tables = tables.filter(|(_, record)| record.settled && !is_unstable(record, &ideal));
+    let tables = tables.filter(|(_, record)| record.settled && !ideal.is_unstable_with(record));
     let found = tables.filter_map(|(index, record)| {
         let far: Vec<(usize, f64)> = (0..CHANNELS)
             // the current that is the load says nothing about the converter

@@ -185,6 +185,14 @@ impl Ideal {
         self.inductor(drawn, duty) > CONTINUOUS * self.half(duty)
     }
 
+    /// Whether power alone is drawn somewhere in a record, beyond what holds the voltage: small errors grow there, and say nothing about the bench.
+    pub fn is_unstable_with(&self, record: &Record) -> bool {
+        record.load.iter().zip(&record.duty).any(|(load, duty)| {
+            let v = self.volts(*duty);
+            load.power > load.conductance * v * v
+        })
+    }
+
     /// Source voltage that makes an output voltage at a duty, when `drop` is lost at the inductor over a period, V.
     pub fn source(&self, volts: f64, duty: f64, drop: f64) -> f64 {
         match self.topology {

@@ -8,9 +8,9 @@
 use crate::attribute::Attribution;
 use crate::causes::{Cut, Search};
 use crate::drive::Model;
-use crate::examine::held;
 use crate::fit::Fit;
 use crate::gain::Pair;
+use crate::held_out::{against, held};
 use crate::parallel;
 use crate::problem::Problem;
 use crate::profile::Profile;
@@ -93,7 +93,7 @@ pub fn chosen(
             .causes
             .iter()
             .any(|cause| attribution.candidates[*cause].is_curve());
-        pair.doubts(problem, &fit.state, of_curve)
+        against(&pair, problem, &fit.state, of_curve)
             .is_empty()
             .then_some((*number, fit, pair))
     });

@@ -75,12 +75,10 @@ pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution) {
             true => f64::INFINITY,
             false => best.state.chi2 + LEVEL * attribution.inflation,
         };
-        let kept: Vec<usize> = without(&best.causes, member);
         let leads = |fit: &&Fit| {
             // the rival of one cause stands last, behind those that are kept
             let other = fit.causes.last().map(|cause| attribution.usual(fit, *cause));
-            fit.causes.len() == kept.len() + 1
-                && fit.causes[..kept.len()] == kept
+            stands_for(fit, best, member)
                 && other.is_some_and(|other| other < own)
                 && fit.state.chi2 <= worst
                 && structures(problem, &attribution.null, &fit.state, attribution.inflation).is_empty()
@@ -135,7 +133,7 @@ impl Attribution {
 
     /// Puts `leader`, a rival of `member`, in the place of the best, which becomes a rival unless it `is_out`; its new cause stands
     /// last.
-    fn lead(&mut self, member: usize, leader: Fit, is_out: bool) {
+    pub(crate) fn lead(&mut self, member: usize, leader: Fit, is_out: bool) {
         let Some(best) = self.best.take() else { return };
         let same = |fit: &Fit| fit.causes == leader.causes;
         let mut rivals = without(&self.rivals, member);
@@ -146,6 +144,19 @@ impl Attribution {
         evidence.push(self.evidence[member] - (leader.state.chi2 - best.state.chi2));
         (self.rivals, self.evidence, self.best) = (rivals, evidence, Some(leader));
     }
+}
+
+/// Rivals that stand in the place of one cause, beside the others, with that place.
+pub(crate) fn in_one_place(attribution: &Attribution) -> impl Iterator<Item = (usize, &Fit)> {
+    let rivals = attribution.rivals.iter().enumerate();
+    let each = rivals.flat_map(|(member, fits)| fits.iter().map(move |fit| (member, fit)));
+    each.filter(|(member, fit)| (attribution.best.as_ref()).is_some_and(|best| stands_for(fit, best, *member)))
+}
+
+/// Whether a rival has all of the best's causes but one, and its own last.
+fn stands_for(rival: &Fit, best: &Fit, member: usize) -> bool {
+    let kept = without(&best.causes, member);
+    rival.causes.len() == kept.len() + 1 && rival.causes.starts_with(&kept)
 }
 
 fn without<T: Clone>(list: &[T], member: usize) -> Vec<T> {

@@ -285,3 +285,90 @@ fn a_step_of_the_duty_that_training_leaves_open_is_no_other_cause() {
     let v_out = findings.gain.heldout.iter().find(|one| one.channel == "v_o").unwrap();
     assert!(v_out.removed.unwrap() > 0.95, "{v_out:?}");
 }
+
+/// At a duty of one half a winding of 0.3 ohm is a switch of 0.6 ohm, or such a diode. Held-out duties tell them apart by more than a volt.
+#[test]
+fn of_a_tie_leads_what_holds_in_the_held_out_records() {
+    let extra: [(&str, Bench); 3] = [
+        ("dcr", bench_with(0.3, 0.0, 0.0)),
+        ("r_ds_on", bench_with(0.0, 0.6, 0.0)),
+        ("diode", bench_with(0.0, 0.0, 0.6)),
+    ];
+    for (hidden, truth) in extra {
+        let train = Bench {
+            duty: vec![(0, 0.5)],
+            ..truth.clone()
+        };
+        let held = Bench {
+            duty: vec![(0, 0.5), (40, 0.3), (90, 0.65), (140, 0.4)],
+            ..truth
+        };
+        let train = vec![record("train", &train, 3)];
+        let alone = diagnose(&model(), train.clone(), &[], &|_| ()).findings;
+        let tied: Vec<&str> = std::iter::once(alone.causes[0].id)
+            .chain(alone.causes[0].rivals.iter().flatten().copied())
+            .collect();
+        assert_eq!(alone.verdict, Verdict::Ambiguous, "{hidden}: {}", alone.sentence);
+        assert!(tied.contains(&hidden), "{hidden}: {tied:?}");
+        let found = diagnose(&model(), train, &[record("held", &held, 4)], &|_| ()).findings;
+        println!("{hidden}: {}\n{:?}", found.sentence, found.noise.repairs);
+        assert_eq!(found.verdict, Verdict::Ambiguous, "{hidden}: {}", found.sentence);
+        assert_eq!(found.causes[0].id, hidden, "{}", found.sentence);
+        let v_out = found.gain.heldout.iter().find(|one| one.channel == "v_o").unwrap();
+        assert!(v_out.removed.unwrap() > 0.95, "{hidden}: {v_out:?}");
+        // where another led, it is said
+        let led = alone.causes[0].id;
+        let says = |note: &String| note.starts_with(&format!("{led} and {hidden} explain the training records"));
+        assert_eq!(
+            found.noise.repairs.iter().any(says),
+            led != hidden,
+            "{:?}",
+            found.noise.repairs
+        );
+    }
+}
+
+/// The preset with so much more resistance in winding, switch and diode, under load steps.
+fn bench_with(winding: f64, switch: f64, diode: f64) -> Bench {
+    let own = Bench::default();
+    Bench {
+        dcr: own.dcr + winding,
+        r_ds_on: own.r_ds_on + switch,
+        r_d: own.r_d + diode,
+        rows: 200,
+        load: vec![(0.0, 0.0, 5.0), (60.0, 0.0, 9.0), (120.0, 0.0, 6.0)],
+        ..own
+    }
+}
+
+/// No member of a tie holds where the capacitor is another.
+#[test]
+fn a_tie_of_which_nothing_holds_in_a_held_out_record_explains_nothing() {
+    let truth = bench_with(0.3, 0.0, 0.0);
+    let held = Bench {
+        capacitance: 40e-6,
+        duty: vec![(0, 0.5), (40, 0.3), (90, 0.65), (140, 0.4)],
+        ..truth.clone()
+    };
+    let train = Bench {
+        duty: vec![(0, 0.5)],
+        ..truth
+    };
+    let found = diagnose(
+        &model(),
+        vec![record("train", &train, 3)],
+        &[record("held", &held, 4)],
+        &|_| (),
+    )
+    .findings;
+    println!("{}", found.sentence);
+    assert_eq!(found.verdict, Verdict::Unexplained, "{}", found.sentence);
+    assert!(found.causes.is_empty());
+    assert!(
+        found
+            .sentence
+            .starts_with("What explains the training records does not hold"),
+        "{}",
+        found.sentence
+    );
+}

@@ -220,7 +220,10 @@ fn score(arguments: &Arguments) -> Result<(), String> {
         let started = Instant::now();
         let case = arguments.out.join("cases").join(&name);
         let answers = arguments.out.join("diagnoses").join(&name);
-        if !answers.join("diagnosis.json").exists() {
+        // a score without the closed loop leaves no mapping
+        let files = ["diagnosis.json", "drm.toml"];
+        let wanted = if arguments.closed_loop.is_some() { 2 } else { 1 };
+        if files[..wanted].iter().any(|file| !answers.join(file).exists()) {
             diagnose(&policyc, &case, &answers, arguments.closed_loop.as_deref())?;
         }
         let truth: Truth = json(&case.join("truth.json"))?;

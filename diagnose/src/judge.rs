@@ -1,0 +1,100 @@
+//! Held-out records as judges of what training records say.
+
+use crate::attribute::Attribution;
+use crate::doubts::Doubt;
+use crate::drive::Model;
+use crate::examine::{Examined, named};
+use crate::findings::Verdict;
+use crate::fit::Fit;
+use crate::gain::Pair;
+use crate::held_out::{against, held, points};
+use crate::left_open::{self, Chosen};
+use crate::record::Record;
+use crate::rivals;
+use crate::shape::structures;
+
+impl Examined {
+    /// Whether the causes, or the model as given, explain the training records, and nothing but the held-out ones speaks against them.
+    pub fn fits_training_alone(&self) -> bool {
+        let is_held_out = |doubt: &Doubt| matches!(doubt, Doubt::HeldOut(..));
+        self.structure.is_empty() && !self.doubts.is_empty() && self.doubts.iter().all(is_held_out)
+    }
+
+    /// Lets the held-out records judge; causes that do not hold in them explain nothing any more.
+    pub fn judged(&mut self, heldout: &[Record], base: &Model) -> Option<Pair> {
+        let found = self.attribution.state();
+        let trim = found.starts.trim_or_none(base.plant.converter.f_sw);
+        let pair = held(&self.problem, heldout, base, found, trim)?;
+        let fails: Vec<Doubt> = match self.verdict {
+            Verdict::Consistent => points(&pair).collect(),
+            // what is no more than the step of a converter has no values that could fail to hold
+            Verdict::Explained | Verdict::Ambiguous if !self.named.is_empty() => {
+                let of_curve = self
+                    .attribution
+                    .best
+                    .as_ref()
+                    .map(|best| of_curve(&self.attribution, best));
+                against(&pair, &self.problem, found, of_curve.unwrap_or(false))
+            }
+            _ => Vec::new(),
+        };
+        if fails.is_empty() {
+            return Some(pair);
+        }
+        if let Some(pair) = self.led_by_what_holds(heldout, base) {
+            return Some(pair);
+        }
+        let explained = (&self.attribution, &self.profiles[..]);
+        if let Some(chosen) = left_open::chosen(&self.problem, explained, heldout, base) {
+            return Some(self.with_values(chosen));
+        }
+        self.verdict = Verdict::Unexplained;
+        self.doubts.extend(fails);
+        Some(pair)
+    }
+
+    /// Lets a member of the tie lead that holds in the held-out records, the one that fits them best, if there is one; they with it. The data that
+    /// the causes were sought in do not put the members in order, so that the one that does not hold stays in the tie.
+    fn led_by_what_holds(&mut self, heldout: &[Record], base: &Model) -> Option<Pair> {
+        let attribution = &self.attribution;
+        let holding = |(member, rival): (usize, &Fit)| {
+            let state = &rival.state;
+            let leaves = structures(&self.problem, &attribution.null, state, attribution.inflation);
+            let trim = state.starts.trim_or_none(base.plant.converter.f_sw);
+            let pair = held(&self.problem, heldout, base, state, trim)?;
+            let holds =
+                leaves.is_empty() && against(&pair, &self.problem, state, of_curve(attribution, rival)).is_empty();
+            holds.then(|| (member, rival.clone(), pair))
+        };
+        let held = rivals::in_one_place(attribution).filter_map(holding);
+        let (member, leader, pair) = held.min_by(|a, b| a.2.total().1.total_cmp(&b.2.total().1))?;
+        let [before, after] =
+            [attribution.best.as_ref()?.causes[member], *leader.causes.last()?].map(|cause| attribution.id(cause));
+        let words = format!(
+            "{before} and {after} explain the training records as well as each other, and in the held-out ones {after} holds and {before} does \
+             not: another record has to judge it"
+        );
+        self.attribution.lead(member, leader, false);
+        self.answer();
+        self.odd.push(words);
+        Some(pair)
+    }
+
+    /// Takes other values, which hold in the held-out records; those.
+    fn with_values(&mut self, chosen: Chosen) -> Pair {
+        for (profile, value) in self.profiles.iter_mut().zip(&chosen.fit.values) {
+            profile.value = *value;
+            let [low, high] = profile.interval;
+            profile.interval = [low.min(*value), high.max(*value)];
+        }
+        self.attribution.best = Some(chosen.fit);
+        self.named = named(&self.attribution, &self.profiles);
+        self.odd.push(chosen.words);
+        chosen.pair
+    }
+}
+
+/// Whether one of the causes of a fit is the curve of a part.
+fn of_curve(attribution: &Attribution, fit: &Fit) -> bool {
+    fit.causes.iter().any(|cause| attribution.candidates[*cause].is_curve())
+}

@@ -300,15 +300,17 @@ pub fn edges(found: &Examined) -> Option<String> {
         .starts
         .trim_or_none(problem.base.plant.converter.f_sw);
     let p = &problem.base.plant.converter;
-    let node = p.topology.span(p.v_in, problem.bases.v);
+    // what a duty of 1 would add to the output: v_in, and of the others, whose d v / d duty is that, v^2 / v_in and (v_in + v)^2 / v_in
+    let span = p.topology.span(p.v_in, problem.bases.v);
+    let output = span * span / p.v_in;
     // or more than can be overlooked in the voltage
-    let is_seen = trim.abs() > problem.duty_accuracy() || (trim * node).abs() > SEEN * problem.sigma[0];
+    let is_seen = trim.abs() > problem.duty_accuracy() || (trim * output).abs() > SEEN * problem.sigma[0];
     (found.verdict != Verdict::Unexplained && is_seen).then(|| {
-        let [time, volts] = [(trim * problem.bases.t_sw, "s"), (trim * node, "V")]
+        let [time, volts] = [(trim * problem.bases.t_sw, "s"), (trim * output, "V")]
             .map(|(value, unit)| si(value.abs(), unit));
         let (way, less) = if trim < 0.0 { ("lost", "more") } else { ("won", "less") };
         format!(
-            "{time} of on-time are {way} in each period ({volts} at the switching node) and put down to edges of the gate: if dead time or delays of \
+            "{time} of on-time are {way} in each period ({volts} of the output) and put down to edges of the gate: if dead time or delays of \
              the bench are not those of the model, they are {less} by this. A voltage that is read off by as much would look the same: a \
              multimeter at the output tells"
         )

@@ -357,3 +357,34 @@ fn sides_in_a_beat_below_the_noise_draw_no_line() {
     assert_ne!(found.verdict, Verdict::Unexplained, "{}", found.sentence);
     assert!(!found.sentence.contains("a line at"), "{}", found.sentence);
 }
+
+/// A duty of 3.1e-4 is 46 mV of the voltage at the switch, three times the noise, and 83 mV of the output.
+#[test]
+fn edges_that_the_output_of_a_buck_boost_shows_are_told() {
+    let text = "[converter]\ntopology = \"buck-boost\"\nrectifier = \"synchronous\"\nv_in = 83.0\ninductance = 28e-6\ncapacitance = 28e-6\n\
+                f_sw = 338e3\n[inductor]\ndcr = 0.02\n[capacitor]\nesr = 0.004\n";
+    let model = Parameters::from_toml("plant.toml".as_ref(), text).unwrap();
+    let mut random = Noise(17);
+    let mut table = Table::of(&["duty", "v_out", "i_l", "i_load"]);
+    for _ in 0..31 {
+        let duty = (random.between(0.4, 0.48) * 1e3).round() / 1e3;
+        let load = (random.between(1.0, 7.0) * 1e2).round() / 1e2;
+        let applied = duty - 3.1e-4;
+        // volt-seconds: v_in d = v (1 - d) + r i_l, and the load has the inductor's current while the switch is off
+        let i_l = load / (1.0 - applied);
+        let v_out = (83.0 * applied - 0.02 * i_l) / (1.0 - applied);
+        table.push(&[
+            duty,
+            v_out + 0.016 * random.normal(),
+            i_l + 0.07 * random.normal(),
+            load,
+        ]);
+    }
+    let findings = diagnose(&model, vec![table.read("points", &model).unwrap()], &[], &|_| ()).findings;
+    assert_eq!(findings.verdict, Verdict::Consistent, "{}", findings.sentence);
+    assert!(
+        findings.sentence.contains("put down to edges of the gate"),
+        "{}",
+        findings.sentence
+    );
+}

@@ -54,13 +54,17 @@ impl Searcher<'_> {
         members
             .map(|(member, own)| {
                 let tolerance = (TIE * self.inflation(best)).max(TIE_SHARE * evidence[member]);
-                let all: Vec<Fit> = match best.causes.len() {
+                let mut all = match best.causes.len() {
                     1 => singles.to_vec(),
-                    _ => {
-                        let chosen = |looks| top(self.of_each_cause(looks), MOST_RIVALS);
-                        self.replacements(best, member, chosen, &format!("rivals of {}", self.id(*own)))
-                    }
+                    _ => Vec::new(),
                 };
+                // a cause that ended better than alone did so from elsewhere, and from there its rivals may end better as well
+                let is_met = |fit: &Fit| fit.causes == best.causes && fit.state.chi2 <= best.state.chi2 + tolerance;
+                if !all.iter().any(is_met) {
+                    let chosen = |looks| top(self.of_each_cause(looks), MOST_RIVALS);
+                    let stage = format!("rivals of {}", self.id(*own));
+                    all.extend(self.replacements(best, member, chosen, &stage));
+                }
                 let is_rival = |fit: &Fit| {
                     let other = fit.causes.last().is_some_and(|cause| !self.same(*cause, *own));
                     // the trim takes over what such a cause leaves, and is more than it may

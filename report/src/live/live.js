@@ -203,7 +203,8 @@
         const row = make("tr", body);
         const button = make("button", make("th", row, "", { scope: "row" }), "", { type: "button", title: "show or hide" });
         button.setAttribute("aria-pressed", "true");
-        make("i", button).style.background = all.find(series => series.name === name).colour;
+        const { colour, dashed } = all.find(series => series.name === name);
+        make("i", button).style.background = dashed ? `repeating-linear-gradient(90deg, ${colour} 0 5px, #0000 5px 9px)` : colour;
         button.append(name);
         button.onclick = () => button.setAttribute("aria-pressed", String(this.toggle(name)));
         this.rows.push({ name, cells: this.panels.map(panel => {

@@ -20,10 +20,13 @@
     });
   };
 
+  // what rounds to 0 has no sign
+  const text = (value, digits) => value.toFixed(digits).replace(/^-(?=[0.]*[1-9])/, "−").replace(/^-/, "");
+
   // digits that a ten-thousandth of the span needs
   const writer = span => {
     const digits = Math.min(9, Math.max(0, 4 - Math.ceil(Math.log10(span || 1))));
-    return value => value === null || value === undefined ? "–" : value.toFixed(digits).replace("-", "−");
+    return value => value === null || value === undefined ? "–" : text(value, digits);
   };
 
   // labels of an axis, with as many digits as their distance needs
@@ -31,7 +34,7 @@
     let digits = 0;
     // a step of 0.025 has three
     while (digits < 9 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6 * step * 10 ** digits) digits++;
-    return ticks.map(value => value === null ? "" : value.toFixed(digits).replace(/^-(?=[0.]*[1-9])/, "−").replace(/^-/, ""));
+    return ticks.map(value => value === null ? "" : text(value, digits));
   };
 
   // px between ticks of a horizontal axis: a label of 12 px, whose decimals are those of a tenth of what is shown, and a gap

@@ -281,7 +281,13 @@ impl Attribution {
             // be, where a bench steps its duty in a rhythm
             let makes_all = self.evidence[*member] > ALL_OF_IT * (self.null.chi2 - problem.count() as f64);
             let is_of_counts = beside_line && !makes_all && matches!(form.search, Search::Counter(_));
-            self.evidence[*member] < threshold(parameters, scatter[*member].max(sure * self.inflation))
+            let inflation = scatter[*member].max(sure * self.inflation);
+            let chance = self.chance(problem, *member) * inflation;
+            let evidence = match chance > 0.0 {
+                true => self.evidence[*member].max(self.of_voltage(problem) * inflation),
+                false => self.evidence[*member],
+            };
+            evidence < threshold(parameters, inflation) + chance
                 || is_of_counts
                 || coloured::is_of_rows(problem, self, *member)
         };
@@ -292,6 +298,39 @@ impl Attribution {
             .map(|(place, value)| Profile::at(member(place), *value))
             .collect();
         self.leave_out_weak(problem, &mut at_best, weak)
+    }
+
+    /// Twice the logarithm of the likelihood that one cause wins in the voltage, whose noise few rows tell poorly and a rounding makes look larger: that
+    /// of any noise, n log(S0 / S1). 0 of several causes.
+    fn of_voltage(&self, problem: &Problem) -> f64 {
+        let alone = self.best.as_ref().is_some_and(|best| best.causes.len() == 1);
+        let values = |state: &State| -> Vec<f64> {
+            let each = (0..problem.records.len()).flat_map(|n| noise::channel(problem, &state.residual, n, 0));
+            each.filter(|value| *value != 0.0).collect()
+        };
+        let [before, after] = [values(&self.null), values(self.state())];
+        match alone && !after.is_empty() {
+            true => after.len() as f64 * libm::log(dot(&before, &before) / dot(&after, &after)),
+            false => 0.0,
+        }
+    }
+
+    /// Chi-square that the best of all counters wins by chance, of a member that is one; 0 of others: twice the logarithm of the ways in which the duties
+    /// of the records are rounded by counters up to this, as [`instants::PRICE`] is of the instants that are told apart.
+    fn chance(&self, problem: &Problem, member: usize) -> f64 {
+        let Some(best) = &self.best else { return 0.0 };
+        let places = self.fitter(problem).places(&best.causes);
+        let number = places.iter().position(|place| place.0 == best.causes[member]);
+        let step = number.and_then(|number| best.values.get(number));
+        match (self.candidates[best.causes[member]].form.search, step) {
+            (Search::Counter(_), Some(step)) if *step > 0.0 => {
+                let mut duties: Vec<f64> = problem.records.iter().flat_map(|r| r.duty.iter().copied()).collect();
+                duties.sort_by(f64::total_cmp);
+                duties.dedup();
+                2.0 * libm::log((duties.iter().sum::<f64>() / step).max(1.0))
+            }
+            _ => 0.0,
+        }
     }
 
     /// [`Attribution::leave_out`] of causes whose evidence is too weak, but for one that moves edges where the trim would do more than edges

@@ -80,7 +80,7 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
     let is_line = |state| !fast::structures(&problem, &attribution.null, state).is_empty();
     let beside_line = is_line(&attribution.null) || is_line(attribution.state());
     odd.extend((attribution.leave_out_coloured(&problem, beside_line)).into_iter().map(|id| {
-        format!("{id} would fit a little better: not named, since a rhythm, or other noise that is not white, lends it as much")
+        format!("{id} would fit a little better: not named, since a rhythm, other noise that is not white, or chance among all values that are tried lends it as much")
     }));
     unsure_levels::note(&mut problem, attribution.state());
     // what is too small for a cause still leaves no structure

@@ -9,7 +9,9 @@
 //! shortest settling: full effort until the current holds the voltage, and not a moment longer.
 //!
 //! The circuit is the plain one: source, switches with resistances and forward voltages, L with its resistance, C, load,
-//! bleed, and the delay of the duty. Everything else a plant file may have is left out.
+//! bleed, and the delay of the duty; of a buck the series resistance of its capacitor as well, whose voltage jumps with the load
+//! whatever is done. Everything else a plant file may have is left out. The way to rest is planned without that resistance: it
+//! damps, and what is planned from the capacitor's voltage period by period arrives all the same.
 
 use plant::{Load, Model, Parameters, Plant, Sample, Topology};
 use serde::Serialize;
@@ -57,6 +59,8 @@ pub struct Question {
     duty: f64,
     target: Target,
     planner: TimeOptimal,
+    /// Series resistance of the capacitor, ohm.
+    esr: f64,
     /// From a sample inside of a PWM period to its end.
     rest_of_period: Option<Part>,
     /// For converters whose output answers the wrong way at first.
@@ -95,6 +99,8 @@ const BEHIND: f64 = 1e-6;
 /// Broken periods of full effort.
 // parts of one period: how finely the effort is cut. A convention: the tests hold from 1 on, in a third of the time
 const PARTS: usize = 16;
+/// ... and of a long effort this share: an inductor that needs hundreds of periods would else take minutes. From 8 periods on.
+const FINEST: f64 = 1.0 / 128.0;
 /// Aims beyond `v_ref` for the settling time, as shares of the settling band.
 // the last one is just inside of the band
 const AIMS: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 0.94];
@@ -135,11 +141,16 @@ impl Question {
         };
         let (resting, duty) = rest(&from)?;
         let (after, held) = rest(&to)?;
+        let esr = parameters.capacitor.esr;
+        let planned = Parameters {
+            capacitor: plant::Capacitor::default(),
+            ..parameters.clone()
+        };
         let mut rest_of_period = match parameters.pwm.sampling_phase {
             0.0 => None,
-            phase => Some(Part::new(&parameters, phase, 1.0)?),
+            phase => Some(Part::new(&planned, phase, 1.0)?),
         };
-        let (mut v_out, mut i_l) = (v_ref, after.sample().i_l);
+        let (mut v_out, mut i_l) = (within(&after.sample(), esr), after.sample().i_l);
         if let Some(part) = &mut rest_of_period {
             (v_out, i_l) = part.pass(v_out, i_l, held, &to);
         }
@@ -163,7 +174,8 @@ impl Question {
             resting,
             duty,
             target,
-            planner: TimeOptimal::new(&parameters, v_ref, range)?,
+            planner: TimeOptimal::new(&planned, v_ref, range)?,
+            esr,
             rest_of_period,
         })
     }
@@ -176,7 +188,7 @@ impl Question {
         // the sooner behind a sampling instant, the longer the step goes unseen
         let first = phases.iter().copied().filter(|phase| *phase > 0.0).reduce(f64::min);
         let worst = first.map_or(at_sample, |phase| {
-            let bound = self.bound(phase);
+            let bound = if phase == BEHIND { behind } else { self.bound(phase) };
             Bound {
                 deviation: bound.deviation.max(at_sample.deviation),
                 extreme: bound.extreme.max(at_sample.extreme),
@@ -222,10 +234,10 @@ impl Question {
         for hold in std::iter::once(None).chain(self.hold.iter().map(Some)) {
             // more full effort first helps the deviation, then the swing to the other side grows beyond it
             let mut least = f64::INFINITY;
-            for part in 1..PARTS * HORIZON {
+            for effort in efforts() {
                 let tried = attempt(Strategy {
                     hold,
-                    effort: part as f64 / PARTS as f64,
+                    effort,
                     beyond: 0.0,
                 });
                 least = least.min(tried.deviation);
@@ -272,26 +284,32 @@ impl Question {
         let mut entered = strategy.beyond == 0.0;
         for n in 0..HORIZON {
             let sample = plant.sample();
-            let (mut v, mut i) = (sample.v_out, sample.i_l);
             // inside the band counts only once the voltage has left it: at the step it is still at `v_ref`
-            entered |= n > 0 && (v - self.v_ref).abs() < run.band && run.left;
-            if let Some(part) = &mut rest_of_period {
-                (v, i) = part.pass(v, i, in_force, &self.to);
-            }
-            for duty in &pending {
-                (v, i) = planner.predict(v, i, *duty, &self.to);
-            }
-            let aim = if entered { 0.0 } else { beyond };
-            let target = Target {
-                v_out: self.target.v_out + aim,
-                ..self.target
-            };
-            let planned = match strategy.hold {
-                None => planner.duty(v, i, &self.to, target),
-                Some(hold) => hold.duty(v, i, target).clamp(self.range[0], self.range[1]),
-            };
+            entered |= n > 0 && (sample.v_out - self.v_ref).abs() < run.band && run.left;
             let share = (strategy.effort - n as f64).clamp(0.0, 1.0);
-            let duty = share * self.full() + (1.0 - share) * planned;
+            let mut planned = || {
+                let (mut v, mut i) = (within(&sample, self.esr), sample.i_l);
+                if let Some(part) = &mut rest_of_period {
+                    (v, i) = part.pass(v, i, in_force, &self.to);
+                }
+                for duty in &pending {
+                    (v, i) = planner.predict(v, i, *duty, &self.to);
+                }
+                let aim = if entered { 0.0 } else { beyond };
+                let target = Target {
+                    v_out: self.target.v_out + aim,
+                    ..self.target
+                };
+                match strategy.hold {
+                    None => planner.duty(v, i, &self.to, target),
+                    Some(hold) => hold.duty(v, i, target).clamp(self.range[0], self.range[1]),
+                }
+            };
+            let duty = match share {
+                // with nothing to plan: most of the periods of a large inductor
+                1.0 => self.full(),
+                _ => share * self.full() + (1.0 - share) * planned(),
+            };
             pending.push(duty);
             in_force = pending.remove(0);
             run.note(&plant.step(duty, &self.to));
@@ -301,6 +319,17 @@ impl Question {
         }
         run.bound
     }
+}
+
+/// The capacitor's own voltage behind its series resistance, V; of a converter whose inductor feeds the output all the time.
+fn within(sample: &Sample, esr: f64) -> f64 {
+    sample.v_out - esr * (sample.i_l - sample.i_out)
+}
+
+/// Periods of full effort that are tried, up to the horizon.
+fn efforts() -> impl Iterator<Item = f64> {
+    let next = |effort: &f64| Some(effort + (1.0 / PARTS as f64).max(FINEST * effort));
+    std::iter::successors(Some(1.0 / PARTS as f64), next).take_while(|effort| *effort < HORIZON as f64)
 }
 
 /// The inductor current that holds `v_out` V under a load in continuous conduction without losses, A.
@@ -403,6 +432,9 @@ fn plain(parameters: &Parameters) -> Parameters {
     plain.switch.r_ds_on_low = p.switch.r_ds_on_low;
     plain.switch.v_f = p.switch.v_f;
     plain.switch.r_d = p.switch.r_d;
+    if p.converter.topology == Topology::Buck {
+        plain.capacitor.esr = p.capacitor.esr;
+    }
     plain.load.bleed = p.load.bleed;
     plain.load.v_fold = p.load.v_fold;
     plain

@@ -134,8 +134,13 @@ fn what_the_limit_leaves_out_is_named() {
     assert!(left_out(&plant).is_empty());
     plant.pwm.duty_delay = 1;
     plant.inductor.dcr = 0.1;
-    assert!(left_out(&plant).is_empty(), "delay and losses are part of it");
     plant.capacitor.esr = 0.01;
+    assert!(
+        left_out(&plant).is_empty(),
+        "delay and losses are part of it, and the jump of a buck's voltage"
+    );
     plant.sensors.v_out.noise = 0.05;
+    assert_eq!(left_out(&plant), ["sensors.v_out.noise"]);
+    (plant.converter.topology, plant.converter.v_in) = (plant::Topology::Boost, 50.0);
     assert_eq!(left_out(&plant), ["capacitor.esr", "sensors.v_out.noise"]);
 }

@@ -169,7 +169,7 @@ fn what_cannot_be_designed_is_exit_code_2_with_its_reason() {
     desk.write("boost.toml", &PLANT.replace("v_in", "topology = \"boost\"\nv_in"));
     for (line, reason) in [
         ("design plant.toml --v-ref 12 --load 10", "cannot hold"),
-        ("design plant.toml --v-ref nan --load 10", "cannot hold"),
+        ("design plant.toml --v-ref nan --load 10", "a voltage above 0"),
         ("design plant.toml --v-ref 5 --load 10 --pole 1", "pole"),
         ("design plant.toml --v-ref 5 --load 10 --noise 0", "without noise"),
         (

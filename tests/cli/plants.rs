@@ -86,6 +86,10 @@ fn a_plant_becomes_a_trained_policy_that_holds_on_its_spread() {
     let again = desk.type_in("new --plant parts/plant.toml --v-ref 12 --loads 20,120 --out mine/policy.toml");
     assert_eq!(again.code, Some(2), "{}", again.stderr);
     assert!(again.stderr.contains("exists already"), "{}", again.stderr);
+    // no file but a folder, as a voltage in its name makes it look
+    desk.succeed("new --plant parts/plant.toml --v-ref 12 --loads 20,120 --out buck-3.3");
+    // which asks for load steps from and to half way as well
+    assert!(desk.read("buck-3.3/train.toml").contains("[70.0, 20.0]"));
 }
 
 /// Rows of the tables of `simulate`, one a load step; not those of the table of what is done at rest, which has three columns.
@@ -171,9 +175,13 @@ fn what_has_no_start_and_no_limit_is_exit_code_2_with_its_reason() {
         ("new weights.safetensors --v-ref 12", "--plant"),
         ("limit plant.toml --v-ref 12", "--load-step"),
         ("limit plant.toml --v-ref 60 --load-step 20,120", "less than the source"),
-        ("limit plant.toml --v-ref nan --load-step 20,120", "no voltage"),
+        ("limit plant.toml --v-ref nan --load-step 20,120", "a voltage above 0"),
+        ("limit plant.toml --v-ref -5 --load-step 2,15", "counts as positive"),
+        ("design plant.toml --v-ref -5 --load 3", "counts as positive"),
+        ("new --plant plant.toml --v-ref -5 --loads 2,15", "counts as positive"),
+        ("new --plant plant.toml --v-ref 12 --loads -20,120", "no range"),
         ("limit plant.toml --v-ref 3 --load-step 2,12", "v_fold"),
-        ("limit plant.toml --v-ref 12 --load-step=-20,120", "no load step"),
+        ("limit plant.toml --v-ref 12 --load-step -20,120", "no load step"),
         ("limit plant.toml --v-ref 12 --resistance-step 0,5", "no load step"),
         (
             "limit plant.toml --v-ref 12 --load-step 20,120 --duty 0.5,0.5",

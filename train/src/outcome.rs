@@ -80,9 +80,10 @@ impl<E: Environment> Trainer<E> {
             .transpose()?
             .unwrap_or_default();
         let mut best = best.clone();
-        let passed_over = !law.is_empty() && overall(&law).met && !overall(&judged).met;
+        let (own, laws) = (overall(&judged), overall(&law));
+        let passed_over = !law.is_empty() && !own.met && (laws.met || laws.cost < own.cost);
         if passed_over && let Some(nothing) = self.law(&mut self.told.clone())? {
-            // on its own load steps the selection preferred a network; nobody wants one that misses what the law keeps
+            // on its own load steps the selection preferred a network; nobody wants one that misses what the law keeps, or by more than it
             (best, judged) = (nothing, law.clone());
         }
         let evaluated = overall(&judged);

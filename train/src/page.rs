@@ -9,7 +9,7 @@ use report::{Axis, Chart, HeatMap, Page, Panel, Ramp, Section, Series, Svg, Tabl
 use crate::faults::Error;
 use crate::outcome::Outcome;
 use crate::rest_page::around_rest;
-use crate::seeds::SeedRun;
+use crate::seeds::{SeedRun, chosen};
 use crate::settings::{Instants, Settings};
 use crate::summary::Worst;
 use crate::trainer::Look;
@@ -60,14 +60,20 @@ fn sentence(settings: &Settings, runs: &[SeedRun], best: &Outcome) -> String {
     let worst = Worst::of(&best.findings);
     let volts = digits(closed_loop::scenario::settled_band(settings.reward.v_ref));
     let met = match (settings.specification.is_empty(), best.evaluated.met) {
-        (true, _) => String::new(),
-        (false, true) => " It meets the specification.".to_owned(),
-        (false, false) => " It misses the specification.".to_owned(),
+        (true, _) => "",
+        (false, true) => " It meets the specification.",
+        (false, false) => " It misses the specification.",
+    };
+    let on_spread = if settings.spread.is_empty() {
+        ""
+    } else {
+        "; on the converters of the spread they are others"
     };
     format!(
-        "Seed {} is the best of {count} on the selection scenarios. In its evaluation the largest deviation is {:.volts$} V, the longest settling \
-         {:.times$} ms, the largest error at rest {:.tail$} V.{met}",
+        "Seed {}, {} ({count} trained). In its evaluation the largest deviation is {:.volts$} V, the longest settling {:.times$} ms, the largest error \
+         at rest {:.tail$} V{on_spread}.{met}",
         best.seed,
+        chosen(settings, best),
         worst.deviation,
         1e3 * worst.settling,
         worst.tail_max,

@@ -170,19 +170,33 @@ fn one<E: Environment>(
     Ok(run)
 }
 
-/// The run whose policy did best on the selection scenarios, of those that meet the specification in their evaluation if there is
-/// one; the first among equals.
+/// Of the runs whose policies meet the specification in their evaluation the one that did best on the selection scenarios; if none does, the one
+/// whose evaluation comes nearest. The first among equals.
 #[must_use]
 pub fn best(runs: &[SeedRun]) -> Option<&Outcome> {
     let outcomes = runs.iter().filter_map(|run| run.outcome.as_ref());
     outcomes.min_by(|a, b| {
-        // the evaluation opens or shuts the door and no more: ranked by its figures, they would be those of a choice among many
-        let order = |outcome: &Outcome| (!outcome.evaluated.met, !outcome.selected.met, outcome.selected.cost);
-        let ((a_shut, a_open, a_cost), (b_shut, b_open, b_cost)) = (order(a), order(b));
-        (a_shut.cmp(&b_shut))
-            .then(a_open.cmp(&b_open))
+        // the evaluation opens the door and no more: ranked by its figures, they would be those of a choice among many. Of those that fail it none is
+        // better than it shows
+        let order = |outcome: &Outcome| match outcome.evaluated.met {
+            true => (0, !outcome.selected.met, outcome.selected.cost),
+            false => (1, false, outcome.evaluated.cost),
+        };
+        let ((a_door, a_missed, a_cost), (b_door, b_missed, b_cost)) = (order(a), order(b));
+        (a_door.cmp(&b_door))
+            .then(a_missed.cmp(&b_missed))
             .then(a_cost.total_cmp(&b_cost))
     })
+}
+
+/// What the one that [`best`] chooses is among the others, in words.
+#[must_use]
+pub fn chosen(settings: &Settings, best: &Outcome) -> &'static str {
+    match (settings.specification.is_empty(), best.evaluated.met) {
+        (true, _) => "whose evaluation came out best",
+        (false, true) => "of those that meet the specification the best on the selection scenarios",
+        (false, false) => "the nearest to the specification, which none meets",
+    }
 }
 
 /// A line for each seed that has an outcome, for people: whether it meets the specification, and the largest figures of its

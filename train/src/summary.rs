@@ -18,7 +18,7 @@ pub struct Summary {
     pub met: Option<bool>,
     /// The limits that the best seed's evaluation misses, the one that is exceeded most first.
     pub missed: Vec<Verdict>,
-    /// The seed that did best on the selection scenarios; `None` before the first look.
+    /// The seed that goes out ([`crate::seeds::best`]); `None` before the first look.
     pub best_seed: Option<u64>,
     /// Of all seeds together.
     pub control_periods: u64,

@@ -104,6 +104,32 @@ fn the_law_of_a_small_capacitor_meets_the_specification() {
     }
 }
 
+/// Neither law nor observer knows the resistance of the capacitor, which the voltage of a load step of 8.3 A jumps by: up to 0.83 V, where the
+/// circuit without it dips by 0.41 V.
+#[test]
+fn the_law_beside_a_capacitor_with_resistance_meets_the_specification() {
+    for (n, esr) in [0.02, 0.05, 0.1].into_iter().enumerate() {
+        let plant = format!(
+            "[converter]\nv_in = 48.0\ninductance = 10e-6\ncapacitance = 220e-6\nf_sw = 200e3\nrectifier = \"synchronous\"\n\
+             [pwm]\nduty_delay = 1\n[capacitor]\nesr = {esr}\n"
+        );
+        let wanted = Wanted {
+            v_ref: 12.0,
+            loads: [20.0, 120.0],
+        };
+        let law = desk(&format!("esr-{n}"), &plant, wanted).law();
+        let missed: Vec<_> = law.verdicts().filter(|verdict| !verdict.holds()).collect();
+        assert!(law.evaluated.met, "{plant}{missed:?}");
+        // what nothing can beat is not beaten: the specification allows 1.1 of it
+        let whole = law
+            .verdicts()
+            .find(|one| one.figure == "deviation" && one.load_step == [20.0, 120.0])
+            .unwrap();
+        let share = 1.1 * whole.found / whole.limit;
+        assert!(share > 0.95 && whole.found > esr * 100.0 / 12.0, "{esr}: {whole:?}");
+    }
+}
+
 /// From 12 V to 1.8 V, where networks of a short training meet the selection and exceed a limit of the evaluation by a third of a percent.
 const CORE: &str = "[converter]\nv_in = 12.0\ninductance = 2.3e-7\ncapacitance = 0.021\nf_sw = 170e3\nrectifier = \"synchronous\"\n\
                     [inductor]\ndcr = 0.00014\n[switch]\nr_ds_on = 0.00019\n[capacitor]\nesr = 2e-5\n[load]\nv_fold = 0.45\n[pwm]\nduty_delay = 1\n";
@@ -134,6 +160,8 @@ fn of_several_seeds_one_that_meets_the_specification_goes_out() {
         let mut outcome = outcome.clone();
         (outcome.seed, outcome.evaluated.met) = (seed, evaluated);
         (outcome.selected.met, outcome.selected.cost) = (selected, cost);
+        // the other way round than the selection
+        outcome.evaluated.cost = 1.0 / cost;
         SeedRun {
             outcome: Some(outcome),
             ended: Ended::Budget,
@@ -144,7 +172,7 @@ fn of_several_seeds_one_that_meets_the_specification_goes_out() {
     let chosen = |runs: &[SeedRun]| seeds::best(runs).unwrap().seed;
     let missed = run(0, false, true, 0.1);
     assert_eq!(chosen(&[missed, run(1, true, true, 0.5), run(2, true, false, 0.2)]), 1);
-    // where none does, the selection decides as it does among those that do
-    assert_eq!(chosen(&[run(3, false, false, 0.2), run(4, false, true, 0.5)]), 4);
+    // where none does, the one whose evaluation misses it least, whatever the selection thought of it
+    assert_eq!(chosen(&[run(3, false, true, 0.2), run(4, false, false, 0.5)]), 4);
     assert_eq!(chosen(&[run(5, true, true, 0.5), run(6, true, true, 0.4)]), 6);
 }

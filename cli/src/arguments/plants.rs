@@ -19,10 +19,10 @@ pub struct New {
         requires_all = ["v_ref", "loads"])]
     pub plant: Option<PathBuf>,
     /// With --plant: voltage to hold, V
-    #[arg(long, value_name = "V", requires = "plant")]
+    #[arg(long, value_name = "V", value_parser = output_voltage, allow_negative_numbers = true, requires = "plant")]
     pub v_ref: Option<f64>,
     /// With --plant: smallest and largest load, W
-    #[arg(long, value_name = "W,W", value_parser = pair, requires = "plant")]
+    #[arg(long, value_name = "W,W", value_parser = pair, allow_hyphen_values = true, requires = "plant")]
     pub loads: Option<[f64; 2]>,
     /// Contract to write, or folder for a policy.toml; must not exist yet. It names the weights as seen from its folder; those that
     /// had to be joined or folded are written beside it
@@ -56,7 +56,7 @@ pub struct Design {
     /// Plant file; its nominal values are what is designed for, its sensor of the output voltage gives the noise
     pub plant: PathBuf,
     /// Voltage to hold, V
-    #[arg(long, value_name = "V")]
+    #[arg(long, value_name = "V", value_parser = output_voltage, allow_negative_numbers = true)]
     pub v_ref: f64,
     /// Largest load current, A
     #[arg(long, value_name = "A")]
@@ -78,10 +78,10 @@ pub struct Limit {
     /// Plant file
     pub plant: PathBuf,
     /// Voltage to hold, V
-    #[arg(long, value_name = "V")]
+    #[arg(long, value_name = "V", value_parser = output_voltage, allow_negative_numbers = true)]
     pub v_ref: f64,
     /// Constant powers before and after a load step, W; may be given more than once, as the other two
-    #[arg(long, value_name = "W,W", value_parser = pair, required_unless_present_any = ["current_step", "resistance_step"])]
+    #[arg(long, value_name = "W,W", value_parser = pair, allow_hyphen_values = true, required_unless_present_any = ["current_step", "resistance_step"])]
     pub load_step: Vec<[f64; 2]>,
     /// Constant currents before and after, A
     #[arg(long, value_name = "A,A", value_parser = pair)]
@@ -118,4 +118,16 @@ fn pair(text: &str) -> Result<[f64; 2], String> {
     let number = |text: &str| text.trim().parse().ok().filter(|x: &f64| x.is_finite());
     let both = text.split_once(',').and_then(|(a, b)| Some([number(a)?, number(b)?]));
     both.ok_or_else(|| "expected two numbers with a comma between them, such as 20,100".into())
+}
+
+/// A voltage to hold. That of an inverting buck-boost counts as positive.
+fn output_voltage(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(volts) if volts > 0.0 && volts.is_finite() => Ok(volts),
+        Ok(volts) if volts < 0.0 => Err(format!(
+            "the output voltage counts as positive, of an inverting buck-boost as well: {}",
+            -volts
+        )),
+        _ => Err("expected a voltage above 0, such as 12 or 3.3".into()),
+    }
 }

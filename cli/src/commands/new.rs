@@ -27,11 +27,11 @@ pub fn run(options: &New) -> Result<Outcome, Failure> {
     }
 }
 
-/// A name without an extension is that of a folder, as with every other `--out`.
+/// The name of a TOML file is that of the contract; every other is that of a folder, as with every other `--out`, `buck-3.3` too.
 fn contract(out: &Path) -> PathBuf {
     match out.extension() {
-        None => out.join("policy.toml"),
-        Some(_) => out.to_owned(),
+        Some(extension) if extension.eq_ignore_ascii_case("toml") => out.to_owned(),
+        _ => out.join("policy.toml"),
     }
 }
 

@@ -31,6 +31,16 @@ pub struct Wanted {
     pub loads: [f64; 2],
 }
 
+impl Wanted {
+    /// Half way between the loads, W.
+    fn middle(&self) -> f64 {
+        rounded(0.5 * (self.loads[0] + self.loads[1]), 3)
+    }
+}
+
+/// Load steps between the ends, before those from and to the middle.
+const WHOLE: usize = 2;
+
 /// A start: what the files are written from.
 #[derive(Debug, Clone)]
 pub struct Start {
@@ -40,14 +50,52 @@ pub struct Start {
     bias: f64,
     /// Duties that may be commanded.
     duties: [f64; 2],
-    /// Of the load steps up and down.
-    limits: [(LoadStep, Limit); 2],
-    /// The same on converters with other parts, behind the factor on L and C.
-    spread: Vec<(f64, [(LoadStep, Limit); 2])>,
+    limits: Limits,
     v_out: Channel,
     i_out: Channel,
     /// Measured by the classical controllers of a boost or a buck-boost, and by the law itself where there is no observer.
     i_l: Option<Channel>,
+}
+
+/// What nothing can beat, whatever the controller.
+#[derive(Debug, Clone)]
+struct Limits {
+    /// Of the load steps up and down, and behind them of those from and to the middle.
+    nominal: Vec<(LoadStep, Limit)>,
+    /// The same on converters with other parts, behind the factor on L and C.
+    spread: Vec<(f64, Vec<(LoadStep, Limit)>)>,
+}
+
+impl Limits {
+    fn of(plant: &Parameters, wanted: Wanted, duties: [f64; 2]) -> Result<Self, Error> {
+        let ([low, high], middle) = (wanted.loads, wanted.middle());
+        let steps = [
+            [low, high],
+            [high, low],
+            [low, middle],
+            [middle, low],
+            [middle, high],
+            [high, middle],
+        ];
+        let all = |plant: &Parameters| -> Result<Vec<(LoadStep, Limit)>, Error> {
+            let limit = |values| -> Result<(LoadStep, Limit), Error> {
+                let step = LoadStep::from(values);
+                let limit = Question::new(plant, wanted.v_ref, step, duties)?.of_all_instants();
+                Ok((step, limit))
+            };
+            steps.into_iter().map(limit).collect()
+        };
+        let other = |factor: f64| {
+            let mut other = plant.clone();
+            other.converter.inductance *= factor;
+            other.converter.capacitance *= factor;
+            Ok((factor, all(&other)?))
+        };
+        Ok(Self {
+            nominal: all(plant)?,
+            spread: SPREAD.into_iter().map(other).collect::<Result<Vec<_>, Error>>()?,
+        })
+    }
 }
 
 /// How a quantity is measured.
@@ -81,11 +129,18 @@ impl Start {
     /// If the loads are no range, or the plant is one for which there is no law or no limit ([`Design::new`],
     /// [`CurrentLaw::new`], [`Question::new`]).
     pub fn new(plant: &Parameters, file: &Path, wanted: Wanted) -> Result<Self, Error> {
-        Self::with(plant, file, wanted, (1.0, None))?.tried(plant, file)
+        Self::with(plant, file, wanted, (1.0, None), None)?.tried(plant, file)
     }
 
-    /// With an observer whose bias may be wrong by so many times the usual in a period, and a law with this pole or the usual one.
-    fn with(plant: &Parameters, file: &Path, wanted: Wanted, (bias, pole): (f64, Option<f64>)) -> Result<Self, Error> {
+    /// With an observer whose bias may be wrong by so many times the usual in a period, and a law with this pole or the usual one; `limits` if they are
+    /// known.
+    fn with(
+        plant: &Parameters,
+        file: &Path,
+        wanted: Wanted,
+        (bias, pole): (f64, Option<f64>),
+        limits: Option<Limits>,
+    ) -> Result<Self, Error> {
         let Wanted { v_ref, loads } = wanted;
         let [low, high] = loads;
         let range = LoadKind::Power.range();
@@ -117,23 +172,8 @@ impl Start {
         // 10 % is left for a load step up: more than any loss of a converter that works
         let highest = if needed < LARGEST_DUTY / 1.1 { LARGEST_DUTY } else { 1.0 };
         let duties = [0.0, highest];
-        let both = |plant: &Parameters| -> Result<[(LoadStep, Limit); 2], Error> {
-            let limit = |values| -> Result<(LoadStep, Limit), Error> {
-                let step = LoadStep::from(values);
-                let limit = Question::new(plant, v_ref, step, duties)?.of_all_instants();
-                Ok((step, limit))
-            };
-            Ok([limit([low, high])?, limit([high, low])?])
-        };
-        let limits = both(plant)?;
-        let other = |factor: f64| {
-            let mut other = plant.clone();
-            other.converter.inductance *= factor;
-            other.converter.capacitance *= factor;
-            Ok((factor, both(&other)?))
-        };
-        let spread = SPREAD.into_iter().map(other).collect::<Result<Vec<_>, Error>>()?;
-        let deviation = largest_of(&limits, |limit| limit.worst.extreme);
+        let limits = limits.map_or_else(|| Limits::of(plant, wanted, duties), Ok)?;
+        let deviation = largest_of(&limits.nominal, |limit| limit.worst.extreme);
         // room for twice the dip and the overshoot that no controller avoids
         let v_full = rounded(f64::max(1.5 * v_ref, v_ref + 2.0 * deviation), 2);
         let i_full = rounded(
@@ -159,16 +199,15 @@ impl Start {
             i_l: (topology != Topology::Buck).then(|| Channel::of_inductor(plant, v_ref, 1.2 * largest)),
             duties,
             limits,
-            spread,
             v_out,
             i_out,
         })
     }
 
-    /// What nothing can beat, by load step.
+    /// What nothing can beat, of the whole load steps up and down.
     #[must_use]
     pub fn limits(&self) -> &[(LoadStep, Limit)] {
-        &self.limits
+        self.limits.nominal.get(..WHOLE).unwrap_or(&self.limits.nominal)
     }
 
     /// What the user should know of the files.
@@ -220,7 +259,7 @@ impl Start {
 
     /// The largest error of the limits, V.
     fn deviation(&self) -> f64 {
-        largest_of(&self.limits, |limit| limit.worst.deviation)
+        largest_of(&self.limits.nominal, |limit| limit.worst.deviation)
     }
 
     /// The load step in A.

@@ -183,8 +183,9 @@ fn report(
     let out = options.out.display();
     let mut text = seeds::table(settings, runs);
     text.push_str(&format!(
-        "\nSeed {}, best on the selection scenarios, in its evaluation (at sampling instants / worst of all instants):\n\n{}",
+        "\nSeed {}, {}, in its evaluation (at sampling instants / worst of all instants):\n\n{}",
         best.seed,
+        seeds::chosen(settings, best),
         tables(&best.judged, &best.law)
     ));
     if missed {

@@ -307,7 +307,7 @@ fn intervals(
 /// Noise estimated, outliers masked, initial states fitted.
 fn prepared(train: Vec<Record>, base: &Model, work: &Work) -> (Problem, State, Vec<Outlier>) {
     let mut problem = Problem::new(train, base.clone());
-    problem.work = work.clone();
+    problem.work = work.over(problem.records.iter().map(Record::rows).sum());
     let mut null = State::settle(&problem, base, &problem.first_starts(base), None);
     if sides::leave_out(&mut problem, &null) {
         null = State::settle(&problem, base, &null.starts, None);

@@ -14,6 +14,9 @@ const ROWS: u64 = 30_000_000;
 // with it all 40 single causes of a blind set are found, as with 30 million; with the two looks below most hopeless diagnoses end within the 25 s that a
 // user should wait
 const ROWS_FAR_OFF: u64 = 12_000_000;
+/// ... but so many simulations of all records, up to the rows above: of 1,400 rows the causes alone took 12 million, and no pair was begun, of which
+/// a capacitor of another capacitance and resistance is one. Of 600 rows, as in blind sets, it is the number above.
+const SIMULATIONS_FAR_OFF: u64 = 20_000;
 /// And where a part of the records is set aside.
 const ROWS_OF_PART: u64 = 20_000_000;
 /// A search in a part may compute as much as this whatever was computed before: where one channel is disturbed, the causes bend to it and come near,
@@ -76,6 +79,15 @@ struct Counts {
 }
 
 impl Work {
+    /// This for records of so many rows together.
+    pub(crate) fn over(&self, rows: usize) -> Self {
+        let all = SIMULATIONS_FAR_OFF.saturating_mul(rows as u64);
+        Work {
+            far_off: self.far_off.max(all.min(self.near)),
+            ..self.clone()
+        }
+    }
+
     /// The same budget for a search in a part of the records.
     pub(crate) fn of_part(&self) -> Self {
         let least = self.all.rows.load(Ordering::Relaxed).saturating_add(LEAST_OF_PART);

@@ -130,6 +130,19 @@ fn the_law_beside_a_capacitor_with_resistance_meets_the_specification() {
     }
 }
 
+/// Half way has the digits of an end, where three are written.
+#[test]
+fn loads_that_lie_near_each_other_have_a_middle() {
+    let wanted = Wanted {
+        v_ref: 100.0,
+        loads: [2000.0, 2008.0],
+    };
+    let text =
+        "[converter]\nv_in = 200.0\ninductance = 2e-3\ncapacitance = 1.5e-3\nf_sw = 10e3\n[pwm]\nduty_delay = 1\n";
+    let law = desk("near", text, wanted).law();
+    assert!(law.verdicts().any(|one| one.load_step == [2000.0, 2004.0]));
+}
+
 /// From 12 V to 1.8 V, where networks of a short training meet the selection and exceed a limit of the evaluation by a third of a percent.
 const CORE: &str = "[converter]\nv_in = 12.0\ninductance = 2.3e-7\ncapacitance = 0.021\nf_sw = 170e3\nrectifier = \"synchronous\"\n\
                     [inductor]\ndcr = 0.00014\n[switch]\nr_ds_on = 0.00019\n[capacitor]\nesr = 2e-5\n[load]\nv_fold = 0.45\n[pwm]\nduty_delay = 1\n";

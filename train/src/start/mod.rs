@@ -34,7 +34,15 @@ pub struct Wanted {
 impl Wanted {
     /// Half way between the loads, W.
     fn middle(&self) -> f64 {
-        rounded(0.5 * (self.loads[0] + self.loads[1]), 3)
+        self.within(0.5)
+    }
+
+    /// A load at a share of the way from the smallest to the largest, W; with few digits where these are not those of an end.
+    fn within(&self, share: f64) -> f64 {
+        let [low, high] = self.loads;
+        let load = low + share * (high - low);
+        let short = rounded(load, 3);
+        if short > low && short < high { short } else { load }
     }
 }
 

@@ -121,7 +121,7 @@ impl Start {
             rounded(high - 0.01 * (high - low), 4),
         ];
         let middle = self.wanted.middle();
-        let inner_middle = rounded(low + 0.45 * (high - low), 3);
+        let inner_middle = self.wanted.within(0.45);
         let steps = |low: f64, middle: f64, high: f64| {
             format!(
                 "[[{low:?}, {high:?}], [{high:?}, {low:?}], [{low:?}, {middle:?}], [{middle:?}, {low:?}], [{middle:?}, {high:?}],\n              \

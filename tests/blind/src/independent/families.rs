@@ -36,6 +36,7 @@ pub fn draw(name: Name, id: &'static str, options: Options, random: &mut Rng) ->
         Family::Cause => cause(name, id, options, random),
         Family::Disturbed => disturbed(name, id, options, random),
         Family::Unlisted => unlisted(name, id, options, random),
+        Family::Pair => super::pairs::pair(name, id, options, random),
         Family::Bench => super::bench::bench(name, id, options, random),
         Family::Nonsense => super::bench::nonsense_case(name, id, options, random),
     }
@@ -84,7 +85,7 @@ fn healthy(name: Name, options: Options, random: &mut Rng) -> Option<Case> {
     Some(draft.case(name, vec![], consistent(), &[], false, random))
 }
 
-fn pick<'a>(all: &'a [Variant], id: &str, random: &mut Rng) -> Option<&'a Variant> {
+pub fn pick<'a>(all: &'a [Variant], id: &str, random: &mut Rng) -> Option<&'a Variant> {
     let of_id: Vec<&Variant> = all.iter().filter(|variant| variant.id == id).collect();
     of_id.get(random.below(of_id.len())).copied()
 }
@@ -338,5 +339,6 @@ pub fn ids(family: Family) -> Vec<&'static str> {
         Family::Bench => [super::faults::TABLE_FAULTS.as_slice(), &super::faults::OTHER_FAULTS].concat(),
         Family::Nonsense => super::faults::NONSENSE.to_vec(),
         Family::Unlisted => [PHYSICS.as_slice(), &DISTURBANCES].concat(),
+        Family::Pair => super::pairs::FIRST.to_vec(),
     }
 }

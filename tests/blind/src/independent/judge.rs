@@ -29,6 +29,8 @@ pub struct Answer {
 pub enum Outcome {
     /// What the truth asks for.
     Right,
+    /// One of two causes, and not the other.
+    OneOfTwo,
     /// The right cause first, and a wrong one beside it.
     RightAndWrong,
     /// A cause that the data cannot tell from the hidden one, without saying so.
@@ -57,6 +59,7 @@ impl Outcome {
     pub fn word(self) -> &'static str {
         match self {
             Outcome::Right => "right",
+            Outcome::OneOfTwo => "one of two",
             Outcome::RightAndWrong => "right, and a wrong one beside",
             Outcome::TieUnsaid => "tie not said",
             Outcome::Withheld => "wrongly unexplained",
@@ -232,6 +235,9 @@ fn answered(truth: &Truth, answer: &Answer, verdict: &str, causes: &[Named]) -> 
         };
     }
     if good == causes.len() {
+        if truth.family == Family::Pair && good < truth.hidden.len() {
+            return Outcome::OneOfTwo;
+        }
         return if verdict == "explained" && untold(truth, causes) {
             Outcome::TieUnsaid
         } else {

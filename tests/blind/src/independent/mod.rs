@@ -25,6 +25,7 @@ mod instruments;
 mod intervals;
 mod judge;
 mod odd;
+mod pairs;
 #[cfg(test)]
 mod physics;
 mod program;

@@ -21,6 +21,8 @@ pub struct Needs {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
     Full,
+    /// As somebody takes them who has two things to find.
+    Long,
     /// For tests.
     Short,
     /// So many rows in each training record: settled points where they are few.
@@ -57,6 +59,8 @@ pub fn programs(design: &Design, needs: Needs, extent: Extent, random: &mut Rng)
         let kind = kinds[number % kinds.len()];
         let rows = match extent {
             Extent::Full => 110 + 10 * random.below(8),
+            Extent::Long if judged => 200 + 10 * random.below(11),
+            Extent::Long => 500 + 50 * random.below(9),
             Extent::Short => 80,
             Extent::Rows(rows) if judged => rows.clamp(FEWEST_IN_TIME, MOST_JUDGED),
             Extent::Rows(rows) => rows.max(FEWEST_IN_TIME),

@@ -48,8 +48,8 @@ fn count(cases: &[&Judgement], outcome: Outcome) -> usize {
 pub fn markdown(seed: u64, judged: &[(usize, Judgement)]) -> String {
     let mut text = format!("# Score of seed {seed}, {} cases\n\n", judged.len());
     text.push_str(
-        "| family | right (95 %, Clopper-Pearson) | wrong beside | tie not said | wrongly unexplained | missed | wrong among several | \
-         confident and wrong | fault not named | refused | topology refused |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "| family | right (95 %, Clopper-Pearson) | one of two | wrong beside | tie not said | wrongly unexplained | missed | wrong among several | \
+         confident and wrong | fault not named | refused | topology refused |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for family in Family::ALL {
         let (cases, topology) = of_family(judged, family);
@@ -60,6 +60,7 @@ pub fn markdown(seed: u64, judged: &[(usize, Judgement)]) -> String {
             share(count(&cases, Outcome::Right), cases.len())
         );
         for outcome in [
+            Outcome::OneOfTwo,
             Outcome::RightAndWrong,
             Outcome::TieUnsaid,
             Outcome::Withheld,
@@ -95,14 +96,14 @@ fn totals(text: &mut String, judged: &[(usize, Judgement)]) {
     );
     let withheld = all
         .iter()
-        .filter(|j| matches!(j.family, Family::Cause | Family::Disturbed));
+        .filter(|j| matches!(j.family, Family::Cause | Family::Disturbed | Family::Pair));
     let withheld: Vec<&Judgement> = withheld.copied().collect();
     let _ = writeln!(
         text,
         "- Wrongly unexplained, of listed causes: {}.",
         share(count(&withheld, Outcome::Withheld), withheld.len())
     );
-    for family in [Family::Cause, Family::Disturbed, Family::Unlisted] {
+    for family in [Family::Cause, Family::Disturbed, Family::Unlisted, Family::Pair] {
         let removed: Vec<f64> = of_family(judged, family)
             .0
             .iter()

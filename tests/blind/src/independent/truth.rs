@@ -20,17 +20,20 @@ pub enum Family {
     Nonsense,
     /// Physics that no plant file states.
     Unlisted,
+    /// Two things are wrong with the plant file, in long records.
+    Pair,
 }
 
 impl Family {
     /// All, in the order of the score.
-    pub const ALL: [Family; 6] = [
+    pub const ALL: [Family; 7] = [
         Family::Healthy,
         Family::Cause,
         Family::Disturbed,
         Family::Bench,
         Family::Nonsense,
         Family::Unlisted,
+        Family::Pair,
     ];
 
     /// As in `--only`.
@@ -43,6 +46,7 @@ impl Family {
             Family::Bench => "bench",
             Family::Nonsense => "nonsense",
             Family::Unlisted => "unlisted",
+            Family::Pair => "pair",
         }
     }
 }

@@ -5,6 +5,7 @@ use crate::basis::Basis;
 use crate::causes::{Candidate, Search, candidates};
 use crate::coloured;
 use crate::fit::{FINE, Fit, Fitter, ROUGH, State};
+use crate::inside::Inside;
 use crate::instants;
 use crate::level::threshold;
 use crate::noise;
@@ -13,14 +14,10 @@ use crate::problem::{Problem, dot};
 use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::record::Record;
-use crate::search::{Known, Searcher, TIE, gained};
+use crate::search::{Known, Searcher, gained};
 use crate::shape::structures;
 use crate::small;
 use crate::unseen::is_there;
-
-/// Causes that are fitted with free instants from where they fit without. As many as are fitted after a linear look in the search: a
-/// convention.
-const LEADERS: usize = 5;
 
 /// Evidence over its threshold where something is in the records that no cause makes: twice as many standard deviations.
 pub const SURE: f64 = 4.0;
@@ -58,48 +55,81 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
     let basis = problem.basis(&null.model, &null.starts, &null.residual);
     let search = searcher(&problem, &candidates, &basis, &null, say);
     let singles = search.singles("each cause alone");
-    let Some((freed, near)) = needs_instants(&search, &singles) else {
+    let Some(inside) = Inside::needed(&search, &singles) else {
         let found = search.grow(&singles);
         let attribution = completed(&search, singles, found);
         return (problem, attribution);
     };
-    say(Progress::Stage("load steps inside a period"));
-    let inside = instants::scanned(&freed, &null.model, &null.starts);
-    // the model as given may be so far off that its instants run away: sensitivities are those of where the instants fit
-    let free_basis = freed.basis(&near.model, &near.starts, &near.residual);
-    let free = searcher(&freed, &candidates, &free_basis, &inside, say);
-    if free.is_out_of_reach(&near, &|_| false) {
-        // the instants take up a part of what no cause explains: beside them nothing is found either
-        let found = search.leading(&singles).map(|fit| search.backward(fit));
-        let attribution = completed(&search, singles, found.unwrap_or((None, Vec::new())));
+    // two causes at once leave behind every load step what instants take up in part: where those do not do all of it, causes are first
+    let is_alone = inside.leaves_nothing(&search);
+    let listed = (!is_alone && (search.has_a_pair() || !inside.has_a_pair(&search))).then(|| search.grow(&singles));
+    let Some(found) = listed else {
+        return beside_instants(&search, singles, inside, (is_alone, None));
+    };
+    let left = found.0.as_ref().filter(|fit| leaves_structure(&search, fit));
+    let beside = left.and_then(|fit| Inside::beside(&search, fit));
+    let is_done = found.0.is_some() && left.is_none() || beside.is_none() && inside.ends_at_limits();
+    if is_done {
+        let attribution = completed(&search, singles, found);
         return (problem, attribution);
     }
-    let mut free_singles = free.singles("load steps inside a period: each cause alone");
-    for (place, fit) in search
-        .leaders(&singles, LEADERS)
-        .into_iter()
-        .map(|place| (place, &singles[place]))
-    {
-        let at = instants::scanned(&freed, &fit.state.model, &fit.state.starts);
-        let fit = free.fitter.from(&fit.causes, &fit.values, &at);
-        if fit.state.chi2 < free_singles[place].state.chi2 {
-            free_singles[place] = fit;
+    beside_instants(&search, singles, beside.unwrap_or(inside), (false, Some(found)))
+}
+
+/// Causes and their evidence.
+type Found = (Option<Fit>, Vec<f64>);
+
+/// The causes beside free instants, which leave nothing but noise alone or beside one if `is_alone`; `listed` are those that were found without.
+fn beside_instants(
+    search: &Searcher<'_>,
+    singles: Vec<Fit>,
+    mut inside: Inside,
+    (is_alone, listed): (bool, Option<Found>),
+) -> (Problem, Attribution) {
+    (search.say)(Progress::Stage("load steps inside a period"));
+    if listed.is_some() {
+        inside.problem.work = inside.problem.work.of_part();
+    }
+    let pairs = std::mem::take(&mut inside.pairs);
+    let free = Searcher {
+        known: Known::with(pairs.into_inner()),
+        ..inside.searcher(search)
+    };
+    let problem = || search.fitter.problem.clone();
+    if free.is_out_of_reach(&inside.state, &|_| false) {
+        // the instants take up a part of what no cause explains: beside them nothing is found either
+        let leading = || search.leading(&singles).map(|fit| search.backward(fit));
+        let found = listed.or_else(leading).unwrap_or((None, Vec::new()));
+        let attribution = completed(search, singles, found);
+        return (problem(), attribution);
+    }
+    // what takes two causes is not found by each alone
+    let unmoved = |cause| free.fitter.unmoved(cause, 0.0);
+    let mut free_singles = match is_alone {
+        true => free.singles("load steps inside a period: each cause alone"),
+        false => (0..singles.len()).map(unmoved).collect(),
+    };
+    for (place, fit) in &inside.leaders {
+        if fit.state.chi2 < free_singles[*place].state.chi2 {
+            free_singles[*place] = fit.clone();
         }
     }
-    let found = free.grow(&free_singles);
+    let begun: Vec<Fit> = free_singles.iter().chain(&inside.set).cloned().collect();
+    let found = free.grow(&begun);
     // two causes together may have looked like instants, as long as one of them was missing; rivals take the longest, and are sought once
     let as_listed = found.0.as_ref().map(|best| search.refitted(best));
     match (as_listed, &found.0) {
         (Some(listed), Some(best))
-            if instants::chi2(&freed, &listed.state.residual)
-                < best.state.chi2 + threshold(instants::count(&freed), free.inflation(best)) =>
+            if instants::chi2(&inside.problem, &listed.state.residual)
+                < best.state.chi2 + threshold(instants::count(&inside.problem), free.inflation(best)) =>
         {
-            let attribution = completed(&search, singles, search.backward(listed));
-            (problem, attribution)
+            let attribution = completed(search, singles, search.backward(listed));
+            (problem(), attribution)
         }
         _ => {
             let attribution = completed(&free, free_singles, found);
-            (freed, attribution)
+            drop(free);
+            (inside.problem, attribution)
         }
     }
 }
@@ -130,7 +160,7 @@ fn sought(problem: &Problem) -> Vec<Candidate> {
     list
 }
 
-fn searcher<'a>(
+pub(crate) fn searcher<'a>(
     problem: &'a Problem,
     candidates: &'a [Candidate],
     basis: &'a Basis,
@@ -148,32 +178,6 @@ fn searcher<'a>(
             effort: ROUGH,
         },
     }
-}
-
-/// The problem with free instants of load steps, if no single cause does what they do, and where they fit best so far.
-fn needs_instants(search: &Searcher<'_>, singles: &[Fit]) -> Option<(Problem, State)> {
-    let (problem, null) = (search.fitter.problem, search.fitter.null);
-    let single = search.leading(singles);
-    if single.as_ref().is_some_and(|fit| search.is_at_bound(fit)) {
-        // a cause that ends where it may go no further is none, and imitates what instants do: they alone are as good if they leave nothing
-        let inflation = noise::inflation(problem, &null.residual);
-        let freed = instants::freed(problem, null, inflation);
-        let leaves_nothing = |(freed, inside): &(Problem, State)| structures(freed, null, inside, inflation).is_empty();
-        if let Some(found) = freed.filter(leaves_nothing) {
-            return Some(found);
-        }
-    }
-    let at = single.as_ref().map_or(null, |fit| &fit.state);
-    let inflation = noise::inflation(problem, &at.residual);
-    if let Some(needed) = instants::freed(problem, at, inflation) {
-        return Some(needed);
-    }
-    let (freed, inside) = instants::freed(problem, null, inflation)?;
-    // as good as the cause: then no cause is named
-    let price = instants::PRICE * instants::count(&freed) as f64;
-    let listed = |fit: &Fit| search.score(fit) - fit.state.chi2 + instants::chi2(&freed, &fit.state.residual);
-    let is_as_good = single.is_none_or(|fit| inside.chi2 + price < listed(&fit) + TIE);
-    is_as_good.then_some((freed, inside))
 }
 
 /// Whether a fit leaves what noise does not.

@@ -12,11 +12,12 @@
 //! unknown of no interest, as initial states are: it is estimated beside every fit, and what it explains is projected out. A delay
 //! of all steps by the same time could also be a cause, so instants are free only in records that need it.
 
-use crate::basis::FARTHEST;
+use crate::basis::{Basis, FARTHEST};
 use crate::drive::{FREE_APART, Model};
 use crate::fit::State;
 use crate::flicker;
 use crate::level::threshold;
+use crate::noise;
 use crate::parallel;
 use crate::problem::{Problem, Starts, dot};
 use crate::record::{CHANNELS, Record};
@@ -64,6 +65,8 @@ pub(crate) fn freed(problem: &Problem, at: &State, inflation: f64) -> Option<(Pr
     let all: Vec<Vec<LoadStep>> = problem.records.iter().map(steps).collect();
     let tried = free(problem, &all)?;
     let state = scanned(&tried, &at.model, &at.starts);
+    // what the steps of one record leave where the table has them is no noise of another's
+    let inflation = inflation.min(noise::inflation(&tried, &state.residual));
     let needs = |index: usize| {
         let gain = chi2_of(&tried, &at.residual, index) - chi2_of(&tried, &state.residual, index);
         let moved = state.starts.late[index].iter().any(|late| late.abs() > NEGLIGIBLE);
@@ -136,22 +139,27 @@ fn chi2_of(problem: &Problem, residual: &[f64], index: usize) -> f64 {
 
 /// The model with initial states and free instants fitted, instants sought over all that is possible.
 pub(crate) fn scanned(problem: &Problem, model: &Model, from: &Starts) -> State {
+    scanned_in(problem, model, from, None)
+}
+
+/// The same with what initial states and instants explain at a model near this one.
+pub(crate) fn scanned_in(problem: &Problem, model: &Model, from: &Starts, basis: Option<&Basis>) -> State {
     let mut starts = from.clone();
     starts.late = problem.first_starts(&problem.base).late;
     let steps: Vec<(usize, usize, usize, usize)> = windows(problem);
     let most = steps.iter().map(|step| step.1 + 1).max().unwrap_or(0);
-    for nth in 0..most {
+    for moved in passes(most) {
         let looks: Vec<f64> = (-LOOKS..=LOOKS)
             .map(|n| FARTHEST * f64::from(n) / f64::from(LOOKS))
             .collect();
         let tried = parallel::map(&looks, |late| {
             let mut tried = starts.clone();
-            for (record, place, ..) in steps.iter().filter(|step| step.1 == nth) {
+            for (record, place, ..) in steps.iter().filter(|step| moved.contains(&step.1)) {
                 tried.late[*record][*place] = *late;
             }
             problem.residual(model, &tried)
         });
-        for (record, place, from, to) in steps.iter().filter(|step| step.1 == nth) {
+        for (record, place, from, to) in steps.iter().filter(|step| moved.contains(&step.1)) {
             let chi2 = |residual: &Vec<f64>| dot(&residual[*from..*to], &residual[*from..*to]);
             let all = looks.iter().zip(tried.iter().map(chi2));
             if let Some((late, _)) = all.min_by(|a, b| a.1.total_cmp(&b.1)) {
@@ -159,7 +167,20 @@ pub(crate) fn scanned(problem: &Problem, model: &Model, from: &Starts) -> State 
             }
         }
     }
-    State::settle(problem, model, &starts, None)
+    State::settle(problem, model, &starts, basis)
+}
+
+/// Which steps of each record are moved at a time, of `most` in one: few one after the other, many all at once, and then every other one, since
+/// what a step leaves has rung out by the step after the next. A look at each by itself would be most of a diagnosis.
+fn passes(most: usize) -> Vec<Vec<usize>> {
+    match most {
+        0..=3 => (0..most).map(|nth| vec![nth]).collect(),
+        _ => [1, 2, 2]
+            .iter()
+            .zip([0, 0, 1])
+            .map(|(apart, first)| (first..most).step_by(*apart).collect())
+            .collect(),
+    }
 }
 
 /// Each free step: its record, its place there, and the part of the vectors that it alone shapes, up to the next step.
@@ -180,6 +201,18 @@ fn windows(problem: &Problem) -> Vec<(usize, usize, usize, usize)> {
     list
 }
 
+/// Whether an instant ends where it may go no further.
+fn is_at_limit(late: f64) -> bool {
+    late.abs() > FARTHEST - NEGLIGIBLE
+}
+
+/// Share of the free instants that end where they may go no further.
+pub(crate) fn share_at_limits(starts: &Starts) -> f64 {
+    let all = || starts.late.iter().flatten();
+    let at_limits = all().filter(|late| is_at_limit(**late)).count();
+    at_limits as f64 / all().count().max(1) as f64
+}
+
 /// What is said of the records whose instants were estimated.
 pub(crate) fn note(problem: &mut Problem, starts: &Starts) {
     for (record, late) in problem.records.iter_mut().zip(&starts.late) {
@@ -197,9 +230,8 @@ pub(crate) fn note(problem: &mut Problem, starts: &Starts) {
                 },
                 if late.len() == 1 { "it" } else { "them" },
             ));
-            let at_limit = |late: &&f64| late.abs() > FARTHEST - NEGLIGIBLE;
             let ended: Vec<String> = (late.iter().zip(&record.free_steps))
-                .filter(|(late, _)| at_limit(late))
+                .filter(|(late, _)| is_at_limit(**late))
                 .map(|(_, row)| format!("{:.6} s", record.time[*row]))
                 .collect();
             if !ended.is_empty() {

@@ -3,6 +3,7 @@
 mod edges;
 mod fewer;
 mod forms;
+mod pairs;
 mod replaced;
 mod singles;
 pub(crate) mod sought;
@@ -201,9 +202,15 @@ impl Searcher<'_> {
             && self.fitter.problem.work.goes_on()
         {
             let stage = format!("more than {}", self.names(&best));
-            let mut larger = self.forward(&best, LOOKED_AT, &stage);
+            let mut larger = match best.causes.len() {
+                1 if self.structure(&best) > 0.0 => self.pairs().to_vec(),
+                _ => Vec::new(),
+            };
+            let is_found = !larger.is_empty() && self.has_a_pair();
+            larger.extend(self.forward(&best, LOOKED_AT, &stage));
             // two causes that resemble each other are best found from the one that explains less alone
-            if (self.structure(&best) > 0.0 || larger.iter().any(|fit| self.is_worth(&best, fit)))
+            if !is_found
+                && (self.structure(&best) > 0.0 || larger.iter().any(|fit| self.is_worth(&best, fit)))
                 && self.fitter.problem.work.goes_on()
             {
                 for leader in self.distinct(&leaders).into_iter().skip(1).take(LEADERS) {

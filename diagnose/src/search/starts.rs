@@ -1,7 +1,7 @@
 //! Where the fit of a candidate begins: what the residual itself says of a line or a counter, or the starts of its entry.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use super::{Searcher, Set, TIE, gained, sought};
 use crate::causes::Search;
@@ -23,20 +23,33 @@ const MOST_COUNTS: usize = 12;
 /// A candidate and the place of one of its starts.
 type Start = (usize, usize);
 
-/// Tangents at starts that stand in the list of causes.
+/// What the looks of a search share.
 #[derive(Debug, Default)]
-pub(crate) struct Known(Mutex<HashMap<Start, Arc<Vec<Vec<f64>>>>>);
+pub(crate) struct Known {
+    /// Tangents at starts that stand in the list of causes.
+    tangents: Mutex<HashMap<Start, Arc<Vec<Vec<f64>>>>>,
+    /// The pairs that were fitted from the model as given.
+    pub(super) pairs: OnceLock<Vec<Fit>>,
+}
 
 impl Known {
+    /// With pairs that are known already.
+    pub(crate) fn with(pairs: Option<Vec<Fit>>) -> Self {
+        Known {
+            pairs: pairs.map(OnceLock::from).unwrap_or_default(),
+            ..Known::default()
+        }
+    }
+
     fn get(&self, start: &Start) -> Option<Arc<Vec<Vec<f64>>>> {
         // poisoned only by a panic, which goes on elsewhere
-        self.0.lock().ok()?.get(start).cloned()
+        self.tangents.lock().ok()?.get(start).cloned()
     }
 
     /// The same whichever thread comes first.
     fn keep(&self, start: Start, tangents: Vec<Vec<f64>>) -> Arc<Vec<Vec<f64>>> {
         let tangents = Arc::new(tangents);
-        if let Ok(mut known) = self.0.lock() {
+        if let Ok(mut known) = self.tangents.lock() {
             known.insert(start, Arc::clone(&tangents));
         }
         tangents

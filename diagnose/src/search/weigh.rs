@@ -32,7 +32,7 @@ const OF_CURVE: f64 = 0.02;
 
 impl Searcher<'_> {
     /// How much structure a fit leaves.
-    pub(super) fn structure(&self, fit: &Fit) -> f64 {
+    pub(crate) fn structure(&self, fit: &Fit) -> f64 {
         self.left_by(&fit.state)
     }
 

@@ -19,8 +19,8 @@ const LEADERS: usize = 5;
 /// convention.
 const NEAR_THE_BEST: f64 = 2.0;
 
-/// Share of the free instants that may end where they may go no further. Those of a bench lie anywhere in a period, and a tenth of them
-/// within the last twentieth on either side; where a cause is missing most run to an end. A convention between.
+/// Share of the free instants that may end where they may go no further. Those of a bench lie anywhere in a period, a twentieth of them within its
+/// last twentieth; where a cause is missing most run to an end. A convention between.
 const MOST_AT_LIMITS: f64 = 0.25;
 
 /// Records whose load steps are freed.

@@ -212,5 +212,22 @@ fn exchanged_truths_are_seen() {
         "{}",
         table(&dcr(), &esr)
     );
-    assert!(table(&esr, &dcr()).contains("| cause | 0 of 2, 0 % (0 to 84 %) | 0 | 0 | 0 | 0 | 0 | 2 |"));
+    assert!(table(&esr, &dcr()).contains("| cause | 0 of 2, 0 % (0 to 84 %) | 0 | 0 | 0 | 0 | 0 | 0 | 2 |"));
+}
+
+#[test]
+fn of_a_pair_both_are_asked_for() {
+    let pair = truth(
+        "pair",
+        &["dcr", "esr"],
+        &json!({"verdicts": ["explained", "ambiguous"], "causes": ["dcr", "esr"], "must_name": true}),
+    );
+    let outcome = |ids: &[&str]| {
+        let causes: Vec<_> = ids.iter().map(|id| json!({"id": id})).collect();
+        judge(&pair, &answer("explained", &json!(causes))).outcome
+    };
+    assert_eq!(outcome(&["esr", "dcr"]), Outcome::Right);
+    assert_eq!(outcome(&["esr"]), Outcome::OneOfTwo);
+    assert_eq!(outcome(&["esr", "v_gain"]), Outcome::RightAndWrong);
+    assert_eq!(outcome(&["v_gain"]), Outcome::ConfidentAndWrong);
 }

@@ -170,7 +170,7 @@ pub(crate) fn scanned_in(problem: &Problem, model: &Model, from: &Starts, basis:
     State::settle(problem, model, &starts, basis)
 }
 
-/// Which steps of each record are moved at a time, of `most` in one: few one after the other, many all at once, and then every other one, since
+/// Which steps of each record are moved at a time, of `most` in one: up to three one after the other, more all at once, and then every other one, since
 /// what a step leaves has rung out by the step after the next. A look at each by itself would be most of a diagnosis.
 fn passes(most: usize) -> Vec<Vec<usize>> {
     match most {

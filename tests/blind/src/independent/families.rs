@@ -339,6 +339,6 @@ pub fn ids(family: Family) -> Vec<&'static str> {
         Family::Bench => [super::faults::TABLE_FAULTS.as_slice(), &super::faults::OTHER_FAULTS].concat(),
         Family::Nonsense => super::faults::NONSENSE.to_vec(),
         Family::Unlisted => [PHYSICS.as_slice(), &DISTURBANCES].concat(),
-        Family::Pair => super::pairs::FIRST.to_vec(),
+        Family::Pair => super::pairs::first(),
     }
 }

@@ -79,11 +79,18 @@ pub(crate) fn evaluate<E: Environment>(
     nominal: &E,
     policy: &Policy,
 ) -> Result<Vec<Judged>, Error> {
+    with_controller(settings, nominal, &of_policy(policy)?)
+}
+
+fn with_controller<E: Environment>(
+    settings: &Settings,
+    nominal: &E,
+    controller: &(impl FnMut(&Sample) -> f64 + Clone),
+) -> Result<Vec<Judged>, Error> {
     let task = &settings.evaluation;
-    let controller = of_policy(policy)?;
     let judged = |place: Place<'_, E>| {
         let v_ref = settings.reward.v_ref;
-        let findings = survey_all(&place.converter, &controller, v_ref, task, &task.all_instants())?;
+        let findings = survey_all(&place.converter, controller, v_ref, task, &task.all_instants())?;
         Ok(Judged {
             score: Scoring::new(&task.load_steps, place.specification, 1.0).score(&findings),
             verdicts: verdicts(&place.name, place.specification, &task.load_steps, &findings),
@@ -114,9 +121,11 @@ impl<E: Environment> Trainer<E> {
         Ok(())
     }
 
-    /// [`evaluate`] of a policy of this training.
-    pub(crate) fn evaluate(&self, policy: &Policy) -> Result<Vec<Judged>, Error> {
-        evaluate(&self.settings, &self.nominal, policy)
+    /// [`evaluate`] of a network of this training.
+    pub(crate) fn evaluate(&self, network: &Network) -> Result<Vec<Judged>, Error> {
+        // the interpreter's bits; with it as controller a third of a short training was its evaluation
+        let controller = quick_controller(&self.contract, network)?;
+        with_controller(&self.settings, &self.nominal, &controller)
     }
 }
 

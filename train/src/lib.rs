@@ -22,6 +22,7 @@ pub mod network;
 pub mod optimiser;
 pub mod outcome;
 pub mod page;
+mod product;
 mod progress;
 mod quick;
 pub mod replay;

@@ -5,10 +5,10 @@
 
 use std::ops::Range;
 
-use ndarray::linalg::general_mat_mul;
-use ndarray::{ArrayView2, ArrayViewMut2};
 use policy::{Activation, Shape};
 use random::{Random, Xoshiro};
+
+use crate::product::{Matrix, multiply, view, view_mut};
 
 /// One layer and where its parameters lie.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,6 +39,7 @@ pub struct Activations {
     /// Per layer `[rows][outputs]`, row-major, behind the activation.
     values: Vec<Vec<f32>>,
     rows: usize,
+    packed: Vec<f32>,
 }
 
 /// Buffers of the backward pass.
@@ -50,6 +51,7 @@ pub struct Backward {
     /// Last layer's weights and their gradient as `[outputs][inputs]`: one action is one stretch of memory.
     turned: Vec<f32>,
     turned_gradient: Vec<f32>,
+    packed: Vec<f32>,
 }
 
 impl Network {
@@ -118,6 +120,7 @@ impl Network {
                 .map(|layer| vec![0.0; rows * layer.outputs])
                 .collect(),
             rows,
+            packed: Vec::new(),
         }
     }
 
@@ -131,24 +134,25 @@ impl Network {
             deltas: [vec![0.0; rows * widest], vec![0.0; rows * widest]],
             turned: vec![0.0; last],
             turned_gradient: vec![0.0; last],
+            packed: Vec::new(),
         }
     }
 
     /// Runs a batch `[rows][inputs]`; the result is [`Activations::outputs`].
     pub fn forward(&self, batch: &[f32], activations: &mut Activations) {
-        let rows = activations.rows;
+        let Activations { values, rows, packed } = activations;
+        let rows = *rows;
         for (index, layer) in self.layers.iter().enumerate() {
-            let (before, after) = activations.values.split_at_mut(index);
+            let (before, after) = values.split_at_mut(index);
             let input = before.last().map_or(batch, Vec::as_slice);
             let output = &mut after[0];
             let bias = &self.parameters[layer.bias.clone()];
             for row in output.chunks_exact_mut(layer.outputs) {
                 row.copy_from_slice(bias);
             }
-            let weights = view(&self.parameters[layer.weights.clone()], layer.inputs, layer.outputs);
-            let mut sums = view_mut(output, rows, layer.outputs);
-            // sums in whatever order is fast: this is for learning; what acts is `q_values`
-            general_mat_mul(1.0, &view(input, rows, layer.inputs), &weights, 1.0, &mut sums);
+            let weights = Matrix::new(&self.parameters[layer.weights.clone()], layer.inputs, layer.outputs);
+            // the order of these sums is that of learning; what acts is `q_values`
+            multiply(Matrix::new(input, rows, layer.inputs), weights, true, output, packed);
             interp::activate(layer.activation, output.iter_mut());
         }
     }
@@ -190,14 +194,19 @@ impl Network {
                     *sum += x;
                 }
             }
-            let delta = view(delta, rows, layer.outputs);
-            let mut weights = view_mut(weights, layer.inputs, layer.outputs);
-            general_mat_mul(1.0, &view(input, rows, layer.inputs).t(), &delta, 0.0, &mut weights);
+            let delta = Matrix::new(delta, rows, layer.outputs);
+            let packed = &mut buffers.packed;
+            multiply(
+                Matrix::new(input, rows, layer.inputs).t(),
+                delta,
+                false,
+                weights,
+                packed,
+            );
             // nothing lies before the first layer
             if index > 0 {
-                let weights = view(&self.parameters[layer.weights.clone()], layer.inputs, layer.outputs);
-                let mut next = view_mut(&mut next[..rows * layer.inputs], rows, layer.inputs);
-                general_mat_mul(1.0, &delta, &weights.t(), 0.0, &mut next);
+                let weights = Matrix::new(&self.parameters[layer.weights.clone()], layer.inputs, layer.outputs);
+                multiply(delta, weights.t(), false, &mut next[..rows * layer.inputs], packed);
                 buffers.deltas.swap(0, 1);
             }
         }
@@ -312,21 +321,6 @@ impl Activations {
     #[must_use]
     pub fn outputs(&self) -> &[f32] {
         self.values.last().map_or(&[], Vec::as_slice)
-    }
-}
-
-/// A slice as a matrix, row-major. The lengths follow from the layers; a mismatch is a fault of this module.
-fn view(values: &[f32], rows: usize, columns: usize) -> ArrayView2<'_, f32> {
-    match ArrayView2::from_shape((rows, columns), values) {
-        Ok(view) => view,
-        Err(error) => unreachable!("{} values as {rows} x {columns}: {error}", values.len()),
-    }
-}
-
-fn view_mut(values: &mut [f32], rows: usize, columns: usize) -> ArrayViewMut2<'_, f32> {
-    match ArrayViewMut2::from_shape((rows, columns), values) {
-        Ok(view) => view,
-        Err(error) => unreachable!("{rows} x {columns}: {error}"),
     }
 }
 

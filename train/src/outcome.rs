@@ -9,7 +9,7 @@ use toml_input::Message;
 
 use crate::contract::{Files, GoldenVectors};
 use crate::faults::Error;
-use crate::judge::{Judged, overall};
+use crate::judge::{Judged, evaluate, overall};
 use crate::network::Network;
 use crate::score::Score;
 use crate::trainer::{Best, Ended, Look, Trainer};
@@ -72,13 +72,12 @@ impl<E: Environment> Trainer<E> {
                 .hint("train at least `every` control periods of [selection]")
                 .into());
         };
-        let policy = self.contract.with(&best.network);
-        let mut judged = self.evaluate(&policy)?;
-        let law = policy
-            .law_alone()
-            .map(|law| self.evaluate(&law))
-            .transpose()?
-            .unwrap_or_default();
+        let mut judged = self.evaluate(&best.network)?;
+        let law = match (self.contract.adds_nothing(), self.contract.policy.law_alone()) {
+            (Some(nothing), _) => self.evaluate(&nothing)?,
+            (None, Some(law)) => evaluate(&self.settings, &self.nominal, &law)?,
+            (None, None) => Vec::new(),
+        };
         let mut best = best.clone();
         let (own, laws) = (overall(&judged), overall(&law));
         let passed_over = !law.is_empty() && !own.met && (laws.met || laws.cost < own.cost);

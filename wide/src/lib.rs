@@ -2,7 +2,12 @@
 //!
 //! A program for every x86-64 processor may use vectors of two doubles only. Here the same code is compiled for wider ones as
 //! well, and the processor is asked at run time. The results are the same to the bit: the compiler neither reorders sums nor
-//! contracts a product and a sum to a fused operation, however wide the vectors are.
+//! contracts a product and a sum to a fused operation, however wide the vectors are. Where a computation is to be fused,
+//! and hand-made for registers, there is [`sixteen`].
+
+mod sixteen;
+
+pub use sixteen::{Sixteen, SixteenWork, sixteen};
 
 /// A computation, with what it works on.
 pub trait Work {

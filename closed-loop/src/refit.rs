@@ -4,7 +4,7 @@ use std::path::Path;
 
 use drm::acquire::{Bench, Hold, LoadSetting, Plan, PlanPoint, Protocol, measure};
 use drm::formula::Losses;
-use drm::{Conduction, DutyRatioMap, FitOptions, Table, TableOptions};
+use drm::{DutyRatioMap, FitOptions, Table, TableOptions};
 use plant::{Load, Parameters, Signals};
 use policy::{Interval, Policy};
 use toml_input::Message;
@@ -142,11 +142,7 @@ impl Refit<'_> {
             ..TableOptions::default()
         };
         let table = Table::parse(Path::new("points.csv"), points, &options)?;
-        let options = FitOptions {
-            conduction: Conduction::of(self.nominal),
-            ..FitOptions::default()
-        };
-        drm::fit(&table, &options)
+        drm::fit(&table, &FitOptions::of(self.nominal))
     }
 
     /// The policy with another mapping, read from the text of a drm.toml as any other.

@@ -147,6 +147,42 @@ fn noise_quantisation_and_a_synchronous_leg_are_measured_too() {
     assert!(report.discontinuous.is_empty());
 }
 
+/// 48 V to about 12 V at 200 kHz: the ripple turns the current round up to some 2.5 A.
+fn synchronous_48() -> Parameters {
+    let mut p = Parameters::paper_model();
+    (p.converter.v_in, p.converter.f_sw) = (47.0, 200e3);
+    (p.converter.inductance, p.converter.capacitance) = (9e-6, 200e-6);
+    p.converter.rectifier = Rectifier::Synchronous;
+    (p.switch.r_ds_on, p.inductor.dcr) = (6e-3, 8e-3);
+    p
+}
+
+#[test]
+fn a_dead_time_that_the_plant_file_lacks_is_seen_where_the_current_turns_round() {
+    let nominal = synchronous_48();
+    for (dead_time, left_out) in [(0.0, 0), (40e-9, 3)] {
+        let mut real = nominal.clone();
+        real.switch.dead_time = dead_time;
+        let mut plan = Plan::new(47.0, &[0.24, 0.26, 0.28], &currents(&[1.0, 4.0, 7.0, 11.0]), 0.0).unwrap();
+        let mut bench = Simulated::new(&real).unwrap();
+        for (point, measurement) in &mut plan.points {
+            let Ok(result) = measure(&mut bench, &real, point, &Protocol::default());
+            *measurement = Some(result);
+        }
+        let options = TableOptions::default();
+        let table = Table::parse(Path::new("points.csv"), plan.to_csv().unwrap(), &options).unwrap();
+        // what is known of the bench is the plant without a dead time
+        let report = drm::fit(&table, &FitOptions::of(&nominal)).unwrap();
+        assert_eq!(report.discontinuous.len(), left_out, "{dead_time}: {:?}", report.notes);
+        assert!(
+            report.fit.left_out.max_v < 1e-3,
+            "{dead_time}: {:?}",
+            report.fit.left_out
+        );
+        assert!(report.notes.iter().any(|note| note.contains("turns round")));
+    }
+}
+
 /// A bench that is not of this workspace: a first-order lag with an offset, as little as the trait asks for.
 struct Lag(f64);
 

@@ -5,6 +5,7 @@
 //!       ─► both forms: components, coefficients, leave-one-out ─► choice ─► meaning, remarks ─► Report
 //! ```
 
+mod boundary;
 mod causes;
 mod meaning;
 mod outliers;
@@ -13,6 +14,7 @@ mod separation;
 mod show;
 mod validation;
 
+use plant::Parameters;
 use policy::Coefficients;
 use serde::Serialize;
 use toml_input::{Fault, Faults, Message};
@@ -41,7 +43,8 @@ pub struct FitOptions {
     /// Points below the boundary of discontinuous conduction are left out.
     pub conduction: Option<Conduction>,
     /// Of a synchronous leg without dead time, whose current turns round and costs no duty by it: points below the boundary
-    /// stay in the fit, and are named, for a bench that has a dead time shows another duty there.
+    /// are named, and stay in the fit unless the table shows that they follow another law, as those of a bench with a dead
+    /// time do.
     pub turns_round: Option<Conduction>,
     /// The plant is averaged: no current of it rests, and there is no boundary to look for.
     pub is_averaged: bool,
@@ -49,6 +52,19 @@ pub struct FitOptions {
     pub keep_outliers: bool,
     /// `a` is taken as given: for a table whose voltage does not vary.
     pub assumed_a: Option<f64>,
+}
+
+impl FitOptions {
+    /// What a plant says of the inductor current of settled points.
+    #[must_use]
+    pub fn of(plant: &Parameters) -> Self {
+        Self {
+            conduction: Conduction::of(plant),
+            turns_round: Conduction::of_turning(plant),
+            is_averaged: plant.converter.model == plant::Model::Averaged,
+            ..Self::default()
+        }
+    }
 }
 
 /// A set of errors in V.
@@ -135,23 +151,12 @@ pub fn fit(table: &Table, options: &FitOptions) -> Result<Report, Faults> {
         notes.push(format!("not measured yet: {}", crate::table::lines(&table.open)));
     }
     // first of all: points in discontinuous conduction follow another law and would be outliers of both forms
-    let (mut points, discontinuous) = continuous(table, options, &mut notes);
-    let constant_load = separation::is_constant_load(&points);
-    let load_line = separation::load_line(&points);
-    let model = |form| Model {
-        form,
-        constant_load,
-        assumed_a: options.assumed_a,
-        // with a given, b is known by itself, and an error is stated at constant current
-        load_line: if options.assumed_a.is_some() { 0.0 } else { load_line },
-    };
-    let forms = forms(&points, constant_load, options).map_err(|message| Faults::from(Fault::from(message)))?;
+    let (mut points, discontinuous) = boundary::continuous(table, options, &mut notes);
+    let forms = forms(&points, options).map_err(|message| Faults::from(Fault::from(message)))?;
     let everything = points.clone();
+    let models = Models::new(&points, options);
     // outliers are judged by the better form: what the other lacks must not hide them
-    let richest = model(match has_product(&points, constant_load, options) {
-        true => Form::FourTerm,
-        false => Form::ThreeTerm,
-    });
+    let richest = models.richest();
     let cap = separation::examine(&richest, &points).directions;
     let outliers = outliers::remove(&richest, &mut points, cap);
     if points.len() < richest.form.fewest_points() + 1 {
@@ -162,7 +167,7 @@ pub fn fit(table: &Table, options: &FitOptions) -> Result<Report, Faults> {
     }
     let mut fits = Vec::new();
     for form in &forms {
-        match one(&model(*form), &points, options) {
+        match one(&models.of(*form), &points, options) {
             Ok(fit) => fits.push(fit),
             // a product that turns the mapping around is no reason to refuse the form that does not have it
             Err(_) if !fits.is_empty() => {
@@ -187,49 +192,8 @@ pub fn fit(table: &Table, options: &FitOptions) -> Result<Report, Faults> {
     })
 }
 
-/// The points in continuous conduction, and the lines of the others.
-fn continuous(table: &Table, options: &FitOptions, notes: &mut Vec<String>) -> (Vec<Point>, Vec<usize>) {
-    let Some(conduction) = &options.conduction else {
-        match &options.turns_round {
-            Some(leg) => notes.extend(turning(&table.points, leg)),
-            None if options.is_averaged => {}
-            None => {
-                let how = "give --plant, or --inductance and --f-sw";
-                notes.push(format!("discontinuous conduction was not looked for: {how}"));
-            }
-        }
-        return (table.points.clone(), Vec::new());
-    };
-    let share = |p: &Point| p.i_out / conduction.boundary(p.v_out, p.v_in);
-    let (kept, rest): (Vec<Point>, Vec<Point>) = table.points.iter().partition(|p| share(p) >= 1.0);
-    // 10 % is a common tolerance of an inductance, by which the boundary moves; a note alone
-    let near: Vec<usize> = kept.iter().filter(|p| share(p) < 1.1).map(|p| p.line).collect();
-    if !near.is_empty() {
-        let lines = crate::table::lines(&near);
-        notes.push(format!("within 10 % of discontinuous conduction: {lines}"));
-    }
-    (kept, rest.iter().map(|p| p.line).collect())
-}
-
-/// What is said of points in which the current of a synchronous leg turns round.
-fn turning(points: &[Point], leg: &Conduction) -> Option<String> {
-    let below: Vec<usize> = points
-        .iter()
-        .filter(|p| p.i_out < leg.boundary(p.v_out, p.v_in))
-        .map(|p| p.line)
-        .collect();
-    (!below.is_empty()).then(|| {
-        format!(
-            "below half of the ripple, where the inductor current turns round in each period: {}. They count, since the plant \
-             file has no dead time. A bench that has one gets its lost duty back there: write `dead_time` into [switch] \
-             (`policyc diagnose` finds it and writes plant.extended.toml) and give that file as --plant",
-            crate::table::lines(&below)
-        )
-    })
-}
-
 /// The forms to fit, the simplest first.
-fn forms(points: &[Point], constant_load: bool, options: &FitOptions) -> Result<Vec<Form>, Message> {
+fn forms(points: &[Point], options: &FitOptions) -> Result<Vec<Form>, Message> {
     let least = options.form.unwrap_or(Form::ThreeTerm).fewest_points();
     if points.len() < least {
         let message = Message::new("too few points in continuous conduction")
@@ -246,7 +210,7 @@ fn forms(points: &[Point], constant_load: bool, options: &FitOptions) -> Result<
                     (1 if the diode's forward voltage is small against v_in): then b and c are fitted at this voltage";
         return Err(message.hint(hint));
     }
-    let product = has_product(points, constant_load, options);
+    let product = Models::new(points, options).has_product;
     if options.form == Some(Form::FourTerm) && !product {
         let message = Message::new("the four-term form needs a load and a voltage that vary, each on its own");
         return Err(message.hint("take the three-term form, or measure more points"));
@@ -258,8 +222,46 @@ fn forms(points: &[Point], constant_load: bool, options: &FitOptions) -> Result<
     })
 }
 
-fn has_product(points: &[Point], constant_load: bool, options: &FitOptions) -> bool {
-    points.len() >= Form::FourTerm.fewest_points() && !constant_load && options.assumed_a.is_none()
+/// The models that a table allows.
+struct Models {
+    constant_load: bool,
+    load_line: f64,
+    assumed_a: Option<f64>,
+    /// The product of duty and current can be told from both.
+    has_product: bool,
+}
+
+impl Models {
+    fn new(points: &[Point], options: &FitOptions) -> Self {
+        let constant_load = separation::is_constant_load(points);
+        let enough = points.len() >= Form::FourTerm.fewest_points();
+        Self {
+            constant_load,
+            // with a given, b is known by itself, and an error is stated at constant current
+            load_line: match options.assumed_a {
+                Some(_) => 0.0,
+                None => separation::load_line(points),
+            },
+            assumed_a: options.assumed_a,
+            has_product: enough && !constant_load && options.assumed_a.is_none(),
+        }
+    }
+
+    fn of(&self, form: Form) -> Model {
+        Model {
+            form,
+            constant_load: self.constant_load,
+            assumed_a: self.assumed_a,
+            load_line: self.load_line,
+        }
+    }
+
+    fn richest(&self) -> Model {
+        self.of(match self.has_product {
+            true => Form::FourTerm,
+            false => Form::ThreeTerm,
+        })
+    }
 }
 
 /// The four-term form if it foretells clearly better and the table tells its terms apart.

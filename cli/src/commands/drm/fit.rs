@@ -92,7 +92,7 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
         .as_deref()
         .map(|path| Parameters::buck_from_file(path, "`drm fit`"))
         .transpose()?;
-    let conduction = plant.as_ref().and_then(Conduction::of).or(given);
+    let of_plant = plant.as_ref().map(FitOptions::of).unwrap_or_default();
     Ok(FitOptions {
         form: match options.terms {
             Terms::Auto => None,
@@ -100,12 +100,9 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
             Terms::Four => Some(Form::FourTerm),
         },
         components: options.components.map(usize::from),
-        conduction,
-        turns_round: plant.as_ref().and_then(Conduction::of_turning),
-        is_averaged: plant
-            .as_ref()
-            .is_some_and(|plant| plant.converter.model == plant::Model::Averaged),
+        conduction: of_plant.conduction.or(given),
         keep_outliers: options.keep_outliers,
         assumed_a: options.assume_a,
+        ..of_plant
     })
 }

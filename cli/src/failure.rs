@@ -1,5 +1,7 @@
 //! Why a run could not be done, and the one place that prints it.
 
+use std::io::Write;
+
 use toml_input::{Fault, Faults, Message};
 
 /// Bad input or an output that cannot be written. Exit code 2, nothing written.
@@ -9,7 +11,8 @@ pub struct Failure(pub Faults);
 impl Failure {
     /// Prints all faults on standard error, with colours where that is a terminal that wants them.
     pub fn print(&self) {
-        anstream::eprintln!("{}", self.rendered());
+        // nobody may be listening, and a panic would give another exit code
+        let _ = writeln!(anstream::stderr(), "{}", self.rendered());
     }
 
     /// The faults with their lines of source, coloured: the stream takes the colours out where they do not belong.

@@ -1,6 +1,9 @@
 //! The command `policyc` as a library: the program calls [`main`], and so does the wheel, in process; [`api`] is what the wheel
 //! calls beside it.
 
+// both end the program where nobody listens any more, `policyc ... | head`: `output` writes answers, `talk` the rest
+#![deny(clippy::print_stderr, clippy::print_stdout)]
+
 pub mod api;
 mod arguments;
 mod campaign;

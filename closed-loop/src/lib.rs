@@ -14,6 +14,7 @@ pub mod controller;
 pub mod converter;
 mod course;
 pub mod design;
+mod doubtful;
 pub mod environment;
 mod faults;
 mod lead;
@@ -40,6 +41,7 @@ pub use controller::{
 };
 pub use converter::Converter;
 pub use course::{Course, Named, Next, Tell};
+pub use doubtful::doubts;
 pub use environment::{Environment, LoadPath, Start};
 pub use faults::Error;
 pub use load_step::{LoadKind, LoadStep};

@@ -17,6 +17,7 @@ use plant::{Load, Model, Parameters, Plant, Sample, Topology};
 use serde::Serialize;
 use toml_input::Message;
 
+use crate::doubtful::doubts;
 use crate::faults::Error;
 use crate::load_step::LoadStep;
 use crate::part::Part;
@@ -137,7 +138,8 @@ impl Question {
             let found = format!(
                 "the plant does not rest at {v_ref} V with a duty within {low}..{high}; a load of constant power may not let it"
             );
-            Err(message.found(found).into())
+            let doubt = doubts(&parameters, v_ref, &step.loads()).into_iter().next();
+            Err(message.found(found).maybe_hint(doubt).into())
         };
         let (resting, duty) = rest(&from)?;
         let (after, held) = rest(&to)?;

@@ -1,5 +1,7 @@
 //! `--quiet`, `--verbose` and `--color`, which every command takes, and what is said where nothing is asked.
 
+use std::process::Stdio;
+
 use super::{Desk, simulate, training};
 
 /// A run that must succeed; its standard output and its standard error.
@@ -52,6 +54,24 @@ fn a_quiet_training_and_simulation_say_only_what_came_out() {
     let (quiet, error) = said(&desk, "simulate s.toml --policy policy --out quiet -q --json");
     assert_eq!(error, "");
     assert!(quiet.starts_with('{'));
+}
+
+/// `policyc train ... 2>&1 | head -2`: the training is not lost for it, nor another exit code given.
+#[test]
+fn a_run_that_nobody_listens_to_ends_as_any_other() {
+    let desk = training::desk();
+    let codes = ["train train/train.toml --out out", "train nowhere.toml --out other"].map(|line| {
+        let mut command = desk.command();
+        command
+            .args(line.split(' '))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        drop((child.stdout.take(), child.stderr.take()));
+        child.wait().unwrap().code()
+    });
+    assert_eq!(codes, [Some(0), Some(2)]);
+    assert!(desk.folder.path().join("out/policy.toml").is_file());
 }
 
 #[test]

@@ -171,6 +171,15 @@ impl Faults {
     pub fn iter(&self) -> std::slice::Iter<'_, Fault> {
         self.list.iter()
     }
+
+    /// The same, of `file` where they are of none.
+    #[must_use]
+    pub fn in_file(mut self, file: &Path) -> Self {
+        for fault in self.list.iter_mut().filter(|fault| fault.place == Place::Nowhere) {
+            (fault.place, fault.file) = (Place::File, file.to_path_buf());
+        }
+        self
+    }
 }
 
 /// A single fault.

@@ -10,7 +10,7 @@ use safetensors::tensor::{TensorView, serialize};
 use sha2::{Digest, Sha256};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use toml_input::Message;
+use toml_input::{FileName, MAX_TOML_BYTES, Message};
 
 use crate::faults::{Error, of_file};
 use crate::network::Network;
@@ -57,6 +57,12 @@ struct Sketch {
     several: Vec<String>,
 }
 
+/// The bytes of a file that another one names.
+fn read_named(path: &Path) -> Result<Vec<u8>, Error> {
+    let name = FileName::named_by_a_file(path);
+    Ok(name.read(MAX_TOML_BYTES).map_err(|message| name.fault(message))?)
+}
+
 impl Contract {
     /// Reads `path` and checks it with a network of the given hidden widths in the place of its weights.
     ///
@@ -81,7 +87,7 @@ impl Contract {
     /// # Errors
     /// If the file cannot be read or is not a sound contract.
     pub fn load_any(path: &Path, hidden: &[usize]) -> Result<Self, Error> {
-        let bytes = std::fs::read(path).map_err(|error| Error::from(of_file(path, &error)))?;
+        let bytes = read_named(path)?;
         Self::read(path, String::from_utf8_lossy(&bytes).into_owned(), hidden)
     }
 
@@ -90,7 +96,6 @@ impl Contract {
     /// # Errors
     /// As [`Contract::load_any`].
     pub fn read(path: &Path, text: String, hidden: &[usize]) -> Result<Self, Error> {
-        let read = |path: &Path| std::fs::read(path).map_err(|error| Error::from(of_file(path, &error)));
         let sketch = sketch(&text);
         if !sketch.several.is_empty() {
             return Err(Fault::in_file(path, several(&sketch.several)).into());
@@ -98,7 +103,7 @@ impl Contract {
         let mut beside = Files::new();
         if let Some(mapping) = &sketch.mapping {
             let folder = path.parent().unwrap_or(Path::new(""));
-            beside.insert(plain(mapping)?, read(&folder.join(mapping))?);
+            beside.insert(plain(mapping)?, read_named(&folder.join(mapping))?);
         }
         let weights = match &sketch.weights {
             Some((name, _)) => plain(name)?,

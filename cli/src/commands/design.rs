@@ -8,6 +8,7 @@ use crate::arguments;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::talk;
 
 /// Prints the lines.
 pub fn run(options: &arguments::Design) -> Result<Outcome, Failure> {
@@ -23,16 +24,23 @@ pub fn run(options: &arguments::Design) -> Result<Outcome, Failure> {
                 .into());
         }
     };
-    let design = Design::new(
-        &plant,
-        Wanted {
-            v_ref: options.v_ref,
-            load: options.load,
-            noise: options.noise,
-            model,
-            pole: options.pole,
-        },
-    )?;
+    let sensor = &plant.sensors.v_out;
+    let noise = match options.noise {
+        None if sensor.noise == 0.0 && sensor.lsb == 0.0 => {
+            let (noise, words) = Wanted::assumed_noise(options.v_ref);
+            talk::note(&words);
+            Some(noise)
+        }
+        given => given,
+    };
+    let wanted = Wanted {
+        v_ref: options.v_ref,
+        load: options.load,
+        noise,
+        model,
+        pole: options.pole,
+    };
+    let design = Design::new(&plant, wanted).map_err(|faults| faults.in_file(&options.plant))?;
     output::say(design.contract().trim_end())?;
     Ok(Outcome::Done)
 }

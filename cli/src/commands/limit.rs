@@ -1,7 +1,7 @@
 //! `policyc limit`
 
 use closed_loop::limit::{Question, left_out};
-use closed_loop::{LoadKind, LoadStep, band_text, holds_power, limits, reaches};
+use closed_loop::{LoadKind, LoadStep, band_text, doubts, holds_power, limits, reaches};
 use plant::Parameters;
 use toml_input::Message;
 
@@ -21,6 +21,7 @@ pub fn run(options: &Limit) -> Result<Outcome, Failure> {
         return Err(message.expected("0 <= LOW < HIGH <= 1").into());
     }
     let steps = options.steps();
+    let loads: Vec<_> = steps.iter().flat_map(LoadStep::loads).collect();
     if !(options.v_ref > 0.0 && options.v_ref.is_finite()) {
         let message = Message::new("--v-ref is no voltage").found(options.v_ref.to_string());
         return Err(message.expected("more than 0 V").into());
@@ -42,9 +43,12 @@ pub fn run(options: &Limit) -> Result<Outcome, Failure> {
     let working = Working::new("searching the limit");
     let mut found = Vec::new();
     for step in steps {
+        let question = Question::new(&plant, options.v_ref, step, options.duty);
         found.push((
             step,
-            Question::new(&plant, options.v_ref, step, options.duty)?.of_all_instants(),
+            question
+                .map_err(|faults| faults.in_file(&options.plant))?
+                .of_all_instants(),
         ));
     }
     drop(working);
@@ -55,6 +59,9 @@ pub fn run(options: &Limit) -> Result<Outcome, Failure> {
         band_text(options.v_ref),
         limits(&found).trim_end()
     ))?;
+    doubts(&plant, options.v_ref, &loads)
+        .iter()
+        .for_each(|doubt| talk::note(doubt));
     if is_outside {
         talk::note(
             "the limit is that of the nominal numbers beside the FMU: that of an unknown model cannot be computed",

@@ -66,7 +66,7 @@ fn for_plant(options: &New, file: &Path, wanted: Wanted) -> Result<Outcome, Fail
     // beside an FMU the nominal numbers: they are what is designed on
     let (plant, is_fmu) = Parameters::nominal_from_file(file)?;
     let working = Working::new("designing, and searching the limit");
-    let start = Start::new(&plant, file, wanted)?;
+    let start = Start::new(&plant, file, wanted).map_err(|faults| faults.in_file(file))?;
     drop(working);
     let out = &contract(&options.out);
     let from_there = |path: &Path| -> Result<String, Failure> {

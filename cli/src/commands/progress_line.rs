@@ -69,7 +69,8 @@ impl ProgressLine {
     /// Clears the line.
     pub fn clear(&mut self) {
         if self.shown {
-            eprint!("\r\x1b[K");
+            // nobody may be listening any more
+            let _ = write!(std::io::stderr(), "\r\x1b[K");
         }
     }
 }

@@ -39,6 +39,23 @@ pub struct Wanted {
     pub pole: Option<f64>,
 }
 
+impl Wanted {
+    /// Noise of the measured output voltage where nothing is known of it, V, and what to say of it: a converter of 12 bits that
+    /// reaches half as far again as the voltage, with one step of noise.
+    #[must_use]
+    pub fn assumed_noise(v_ref: f64) -> (f64, String) {
+        let step = 1.5 * v_ref / 4096.0;
+        // a rounding to steps is spread evenly over one: its variance is a twelfth of the square
+        let noise = step * (1.0_f64 + 1.0 / 12.0).sqrt();
+        let words = format!(
+            "the plant file has neither noise nor lsb in [sensors.v_out]: a converter of 12 bits up to {:.3} V with one step of noise is \
+             assumed, {noise:.3e} V; --noise says another",
+            1.5 * v_ref
+        );
+        (noise, words)
+    }
+}
+
 /// Double pole of a buck's law.
 // of .3, .4, .5 and .6 the one whose law, with L and C 15 % low, stayed within 7 % of the limit on the four
 // examples/plants/buck-*.toml: .4 exceeds it by 23 % on one of them, .6 by 13 %

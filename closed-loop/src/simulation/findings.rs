@@ -10,6 +10,7 @@ use super::spread::{self, Draws, Spread, Spreads};
 use crate::agent::REFERENCE;
 use crate::converter::Converter;
 use crate::course::Course;
+use crate::doubtful::doubts;
 use crate::faults::Error;
 use crate::limit::{Limit, left_out};
 use crate::load_step::{LoadKind, LoadStep};
@@ -248,7 +249,8 @@ fn of_this_converter(scenario: &Scenario, v_ref: f64, file: &Path) -> Result<(),
 }
 
 fn notes(scenario: &Scenario, policy: &Policy, converter: &Converter, v_ref: f64) -> Vec<String> {
-    let mut notes = Vec::new();
+    let loads: Vec<_> = scenario.load_steps.iter().flat_map(LoadStep::loads).collect();
+    let mut notes = doubts(converter.parameters(), v_ref, &loads);
     if scenario.default_steps {
         notes.push(
             "the scenario names no load step: those of the paper's 100 V converter are taken; give load_steps (W), current_steps (A) \

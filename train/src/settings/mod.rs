@@ -245,6 +245,29 @@ impl Settings {
         read::settings(&Document::from_text(path, text)?)
     }
 
+    /// What is doubtful of a training on this converter, a sentence without a full stop each: numbers that no converter has, and
+    /// load steps that the training never meets.
+    #[must_use]
+    pub fn remarks(&self, converter: &plant::Parameters) -> Vec<String> {
+        let loads = &self.episode.loads;
+        let met = loads.values.iter().chain(&loads.range);
+        let (low, high) = met.fold((f64::INFINITY, 0.0_f64), |(low, high), w| (low.min(*w), high.max(*w)));
+        let mut remarks = closed_loop::doubts(converter, self.reward.v_ref, &[low, high].map(plant::Load::power));
+        for (table, task) in [
+            ("[selection]", &self.selection.task),
+            ("[evaluation]", &self.evaluation),
+        ] {
+            // a judged load may lie a little outside of those that are trained
+            let is_beyond = |watts: &&f64| **watts < 0.9 * low || **watts > 1.1 * high;
+            if let Some(watts) = task.load_steps.iter().flatten().find(is_beyond) {
+                remarks.push(format!(
+                    "{table} judges at {watts} W, and the loads of [episode] are {low} to {high} W: no policy has learnt it"
+                ));
+            }
+        }
+        remarks
+    }
+
     /// Loads and share of randomisation in control period `step`.
     #[must_use]
     pub fn stage(&self, step: u64) -> (&Loads, f64) {

@@ -105,6 +105,10 @@ fn seeds(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<u64>> {
         // TOML knows no larger integers
         item.integer(0..=i64::MAX as u64, faults)
     })?;
+    if let Some(twice) = seeds.iter().enumerate().find(|(n, seed)| seeds[..*n].contains(seed)) {
+        let message = Message::new(format!("{} names a seed twice", value.label())).found(twice.1.to_string());
+        faults.push(value.fault(message.expected("different numbers")));
+    }
     if seeds.is_empty() {
         faults.push(value.fault(messages::out_of_range(value.label(), "no seed", "at least one")));
     }

@@ -13,7 +13,7 @@ use std::path::Path;
 
 use closed_loop::design::{CurrentLaw, Design, Noise, Wanted as Asked, rounded};
 use closed_loop::limit::{Limit, Question};
-use closed_loop::{LoadKind, LoadStep, holds_power};
+use closed_loop::{LoadKind, LoadStep, doubts, holds_power};
 use plant::{Parameters, Sensor, Topology};
 use toml_input::Message;
 
@@ -53,6 +53,7 @@ const WHOLE: usize = 2;
 #[derive(Debug, Clone)]
 pub struct Start {
     wanted: Wanted,
+    plant: Parameters,
     base: Base,
     /// How many times the usual the observer's bias may be wrong by in a period.
     bias: f64,
@@ -192,6 +193,7 @@ impl Start {
         let i_out = Channel::new(&plant.sensors.i_out, [-rounded(0.05 * i_full, 1), i_full]);
         Ok(Self {
             wanted,
+            plant: plant.clone(),
             base: match measures_inductor(plant) {
                 false => Base::Observed(Design::new(plant, asked(v_out.assumed.map(noise)))?),
                 true => Base::Measured {
@@ -221,7 +223,8 @@ impl Start {
     /// What the user should know of the files.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
-        let mut notes = Vec::new();
+        let loads = self.wanted.loads.map(plant::Load::power);
+        let mut notes = doubts(&self.plant, self.wanted.v_ref, &loads);
         let inductor = self.i_l.and_then(|channel| channel.assumed);
         if self.v_out.assumed.or(self.i_out.assumed).or(inductor).is_some() {
             notes.push(

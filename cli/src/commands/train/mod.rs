@@ -60,6 +60,10 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     let contract = Contract::load(&settings.contract, &settings.hidden)?;
     let converter = converter(options, &settings)?;
     closed_loop::holds_power(converter.parameters(), settings.reward.v_ref, &settings.plant)?;
+    settings
+        .remarks(converter.parameters())
+        .iter()
+        .for_each(|doubt| talk::note(doubt));
     let kept = Kept::new(&options.out);
     let course = Course {
         threads: threads(options, &converter),

@@ -85,13 +85,13 @@ impl Watch for Watcher<'_> {
                 let last = shown.entry(seed).or_insert_with(Instant::now);
                 if talk::is_verbose() || last.elapsed() >= LOG_EVERY {
                     *last = Instant::now();
-                    eprintln!(
+                    talk::tell(&format!(
                         "seed {seed}: {} of {}, {}, {} left at most",
                         grouped(look.step),
                         grouped(self.steps),
                         progress,
                         HumanDuration(Duration::from_secs_f64(progress.remaining.clamp(0.0, 1e9)))
-                    );
+                    ));
                 }
             }
         }
@@ -119,7 +119,7 @@ impl Watch for Watcher<'_> {
                 }
                 let _ = all.println(line);
             }
-            View::Log(_) => eprintln!("{line}"),
+            View::Log(_) => talk::tell(&line),
         }
     }
 }

@@ -258,6 +258,28 @@ impl Span {
     }
 }
 
+/// [`dot`] of several columns side by side.
+#[inline(always)]
+pub fn dots<const N: usize>(a: &[f64], columns: &[[f64; N]]) -> [f64; N] {
+    let mut sums = [0.0; N];
+    for (a, row) in a.iter().zip(columns) {
+        for (sum, x) in sums.iter_mut().zip(row) {
+            *sum += a * x;
+        }
+    }
+    sums
+}
+
+/// Takes `shares` of a direction out of columns side by side.
+#[inline(always)]
+pub fn take_out<const N: usize>(columns: &mut [[f64; N]], shares: [f64; N], direction: &[f64]) {
+    for (row, a) in columns.iter_mut().zip(direction) {
+        for (x, share) in row.iter_mut().zip(shares) {
+            *x += -share * a;
+        }
+    }
+}
+
 impl Across {
     /// How far the unknown moves to explain most of `u`.
     fn share(&self, u: &[f64]) -> f64 {
@@ -287,6 +309,24 @@ impl Basis {
         }
         for across in &self.across {
             axpy(u, -across.share(u), &across.own);
+        }
+    }
+
+    /// [`Basis::project`] of several columns side by side, with the bits of each alone.
+    #[inline(always)]
+    pub fn project_beside<const N: usize>(&self, u: &mut [[f64; N]]) {
+        for span in &self.spans {
+            let part = &mut u[span.from..span.to];
+            for q in &span.q {
+                let shares = dots(q, part);
+                take_out(part, shares, q);
+            }
+        }
+        for across in &self.across {
+            let own = &across.own;
+            let length = dot(own, own);
+            let shares = dots(own, u).map(|along| along / length);
+            take_out(u, shares, own);
         }
     }
 

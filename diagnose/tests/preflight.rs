@@ -237,6 +237,53 @@ fn ripple_at_the_instant_of_sampling_is_no_probe() {
     }
 }
 
+/// A filter that hardly damps: behind each step the current swings by more than its mean through the rest of the record, and the median
+/// of its rows is far from what rest would show.
+#[test]
+fn a_current_that_swings_is_no_probe() {
+    let mut random = Noise(31);
+    for sampled in [0.2, 0.3] {
+        let bench = Bench {
+            v_in: 6.4,
+            inductance: 0.32e-6,
+            capacitance: 140e-6,
+            f_sw: 690e3,
+            dcr: 4e-3,
+            esr: 8e-4,
+            r_ds_on: 3e-3,
+            v_f: 0.02,
+            r_d: 1e-3,
+            rows: ROWS,
+            sampled,
+            duty: vec![
+                (0, 0.66),
+                (12, 0.61),
+                (38, 0.465),
+                (68, 0.387),
+                (96, 0.53),
+                (120, 0.374),
+            ],
+            load: vec![(0.0, 0.9, 6.0), (68.0, 0.9, 7.8), (120.0, 0.9, 5.4)],
+            ..Bench::default()
+        };
+        let digits = [
+            ("v_out", 0.002, 1e-3),
+            ("i_l", 0.02, 1e-3),
+            ("i_out", 0.02, 1e-3),
+            ("v_in", 0.003, 1e-3),
+        ];
+        let table = bench.run().measured(&digits, &mut random);
+        // the plant file says another instant
+        let mut believed = of(&bench);
+        believed.pwm.sampling_phase = 0.0;
+        let read = table
+            .read("run", &believed)
+            .map(|_| ())
+            .map_err(|faults| faults.to_string());
+        assert_eq!(read, Ok(()), "{sampled}");
+    }
+}
+
 fn read(name: &str, table: &Table) -> Record {
     table.read(name, &model()).unwrap()
 }

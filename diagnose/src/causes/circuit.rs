@@ -218,9 +218,8 @@ pub(super) const CORE_LOSS: Cause = Cause {
         &[knob(
             "core_conductance",
             &["inductor.core_conductance"],
-            // a loss of a tenth of the load's power in a buck; across the inductor of a boost lies a part of its output voltage alone, and a core
-            // that loses the same conducts three times as much
-            Reach::Conductance(0.3, 0.001),
+            // half of the load's power: more than any core takes that a bench goes on with
+            Reach::LossAcross(0.5, 0.0015),
         )],
         // at none the response of a current that rests has a corner. A convention: a twentieth of what is tried
         Search::OwnOr(&[&[15.0]]),

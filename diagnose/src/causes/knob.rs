@@ -17,6 +17,8 @@ pub struct Bases {
     pub filter: f64,
     /// Inductance of the converter, H.
     pub inductance: f64,
+    /// Mean square of the voltage across the inductor, V^2.
+    pub across: f64,
 }
 
 /// How a parameter may move: lowest, highest, and the step that counts as one.
@@ -37,6 +39,8 @@ pub(crate) enum Reach {
     BesideInductor(f64, f64, f64),
     /// In units of i / v.
     Conductance(f64, f64),
+    /// Of a conductance across the inductor, in shares of the load's power that it takes.
+    LossAcross(f64, f64),
     /// In units of v_in.
     Source(f64, f64, f64),
     /// In units of v.
@@ -207,6 +211,7 @@ impl Knob {
                 [0.0, most.min(high * bases.inductance), step * bases.inductance]
             }
             Reach::Conductance(high, step) => by(bases.i / bases.v, 0.0, high, step),
+            Reach::LossAcross(high, step) => by(bases.v * bases.i / bases.across, 0.0, high, step),
             Reach::Source(low, high, step) => by(bases.v_in, low, high, step),
             Reach::Voltage(low, high, step) => by(bases.v, low, high, step),
             Reach::Current(low, high, step) => by(bases.i, low, high, step),

@@ -307,6 +307,7 @@ mod tests {
                 t_sw: 5e-6,
                 filter,
                 inductance: 22e-6,
+                across: 432.0,
             };
             let all = candidates(&model, &bases);
             let ripple = all.iter().find(|one| one.cause.id == "input_ripple").unwrap();
@@ -328,6 +329,7 @@ mod tests {
                 t_sw: 1e-6,
                 filter: 2e4,
                 inductance,
+                across: 4.0,
             };
             let all = candidates(&model, &bases);
             let found = all.iter().find(|one| one.cause.id == "esl").unwrap();
@@ -348,6 +350,7 @@ mod tests {
             t_sw: 5e-6,
             filter: 1.9e3,
             inductance: 22e-6,
+            across: 432.0,
         };
         let candidates = candidates(&model, &bases);
         let left = |key: &str| {

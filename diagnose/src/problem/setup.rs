@@ -1,5 +1,7 @@
 //! What is settled of records before they are a problem: their source, magnitudes, and pieces of unstable ones.
 
+use plant::Topology;
+
 use crate::causes::Bases;
 use crate::drive::Model;
 use crate::ideal::Ideal;
@@ -55,6 +57,12 @@ pub(super) fn bases(records: &[Record], base: &Model) -> Bases {
         (0..r.rows()).map(drawn).collect::<Vec<_>>()
     };
     let i = median(records.iter().flat_map(current));
+    // in balance the volts of the on-time weigh as much as those of the off-time: `d on^2 + (1 - d) off^2 = on off`
+    let across = match base.plant.converter.topology {
+        Topology::Buck => (v_in - v) * v,
+        Topology::Boost => v_in * (v - v_in),
+        Topology::BuckBoost => v_in * v,
+    };
     Bases {
         v,
         i: if i > 0.0 { i } else { 1.0 },
@@ -62,6 +70,8 @@ pub(super) fn bases(records: &[Record], base: &Model) -> Bases {
         t_sw: base.plant.t_sw(),
         filter: base.plant.converter.f_sw / ideal.swing(),
         inductance: base.plant.converter.inductance,
+        // next to the source's voltage there is hardly any
+        across: across.max(0.1 * v * v),
     }
 }
 
@@ -172,5 +182,38 @@ mod tests {
         assert_eq!(cut("i_load", 0..0), (vec![[0, 100]], false));
         // what a resistor draws is known at any voltage
         assert_eq!(cut("r_load", 50..54), (vec![[0, 100]], false));
+    }
+
+    #[test]
+    fn a_core_may_take_half_of_the_load_s_power_in_each_topology() {
+        // topology, source, duty; on and off: what lies across the inductor
+        for (topology, v_in, duty, on, off) in [
+            ("buck", 40.0, 0.25, 30.0, -10.0),
+            ("boost", 20.0, 0.5, 20.0, -20.0),
+            ("buck-boost", 20.0, 2.0 / 3.0, 20.0, -40.0),
+        ] {
+            let text = format!(
+                "[converter]\ntopology = \"{topology}\"\nv_in = {v_in}\ninductance = 22e-6\ncapacitance = 330e-6\nf_sw = 100e3\n"
+            );
+            let parameters = Parameters::from_toml(Path::new("plant.toml"), &text).unwrap();
+            let v_out = if topology == "buck" { 10.0 } else { 40.0 };
+            let mut table = "t,d,v_o,i_load\n".to_owned();
+            for n in 0..40 {
+                let _ = writeln!(
+                    table,
+                    "{:.6},{duty},{:.3},3",
+                    n as f64 * 1e-5,
+                    v_out + 0.01 * (n % 3) as f64
+                );
+            }
+            let sheet = Sheet::parse(Path::new("a.csv"), table.into(), &Record::file_options()).unwrap();
+            let record = Record::read(&sheet, &ColumnMap::default(), &parameters).unwrap();
+            let base = crate::drive::Model::new(&parameters);
+            let bases = super::bases(&[record], &base);
+            let all = crate::causes::candidates(&base, &bases);
+            let core = all.iter().find(|one| one.cause.id == "core_loss").unwrap();
+            let lost = core.ranges[0][1] * (duty * on * on + (1.0 - duty) * off * off);
+            assert!((lost / (0.5 * v_out * 3.0) - 1.0).abs() < 0.01, "{topology}: {lost} W");
+        }
     }
 }

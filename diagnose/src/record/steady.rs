@@ -30,14 +30,43 @@ pub struct Beside {
     pub times_mean: f64,
     /// Median of what is expected, in the channel's unit.
     pub expected: f64,
-    /// Median distance to what any instant of sampling would show, as a share of the mean.
+    /// Median distance to what any instant of sampling would show, as a share of the mean: over the rows before the first step where
+    /// the record begins at rest, else over all of them. Behind a step a current may swing by more than its mean.
     pub apart: f64,
     /// Median of the ripple at the instant of sampling as a share of what is expected there.
     pub ripple: f64,
 }
 
+/// Fewest rows before the first step that say how the record begins. A convention.
+const BEGINNING: usize = 5;
+/// Share of its mean within which a signal at rest stays, noise and all. A convention: a swing that matters here is larger.
+const AT_REST: f64 = 0.2;
+
+/// Rows before the first change of duty or load, if the channel rests there.
+fn resting(record: &Record, channel: usize) -> Option<usize> {
+    let (duty, load, shown) = (&record.duty, &record.load, &record.measured[channel]);
+    // a load that was measured has noise
+    let near = |a: f64, b: f64| (a - b).abs() <= 0.5 * AT_REST * b.abs();
+    let is_same = |n: &usize| {
+        let (now, first) = (&load[*n], &load[0]);
+        let loads = near(now.conductance, first.conductance) && near(now.current, first.current);
+        duty[*n] == duty[0] && loads && near(now.power, first.power)
+    };
+    let count = (0..record.rows()).take_while(is_same).count();
+    if record.settled || count < BEGINNING {
+        return None;
+    }
+    let known = || shown[..count].iter().copied().filter(|value| value.is_finite());
+    let (low, high) = known().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+        (low.min(x), high.max(x))
+    });
+    (high - low < AT_REST * median(known()).abs()).then_some(count)
+}
+
 /// The channel beside its expectation; nothing without rows that have both.
 pub fn beside(record: &Record, parameters: &Parameters, channel: usize) -> Option<Beside> {
+    let resting = resting(record, channel);
+    let mut at_rest = Vec::new();
     let rows: Vec<[f64; 5]> = record.measured[channel]
         .iter()
         .enumerate()
@@ -57,6 +86,9 @@ pub fn beside(record: &Record, parameters: &Parameters, channel: usize) -> Optio
             let apart = (shown.abs() - mean).abs() - half;
             let known = shown.is_finite() && shown != 0.0 && expected > 0.0;
             let ripple = (expected - mean).abs() / expected;
+            if known && resting.is_some_and(|count| row < count) {
+                at_rest.push(apart.max(0.0) / mean);
+            }
             known.then(|| {
                 [
                     shown.abs() / expected,
@@ -73,7 +105,10 @@ pub fn beside(record: &Record, parameters: &Parameters, channel: usize) -> Optio
         times: middle(0),
         times_mean: middle(1),
         expected: middle(2),
-        apart: middle(3),
+        apart: match at_rest.is_empty() {
+            true => middle(3),
+            false => median(at_rest.iter().copied()),
+        },
         ripple: middle(4),
     })
 }

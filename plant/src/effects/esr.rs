@@ -13,9 +13,9 @@ pub const EFFECT: Effect = Effect {
     parameters: &[number!(
         capacitor.esr,
         "ohm",
-        // from film and polymer to aluminium electrolytic capacitors
+        // from film and polymer to aluminium electrolytic capacitors, of which a few uF for 400 V have tens of ohm
         "series resistance",
-        (0.0, 10.0),
+        (0.0, 100.0),
         (0.002, 0.3),
         0.0
     )],

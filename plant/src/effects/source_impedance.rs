@@ -37,7 +37,7 @@ pub const EFFECT: Effect = Effect {
             "ohm",
             // as of the output capacitor
             "series resistance of the input capacitor; needs c_in",
-            (0.0, 10.0),
+            (0.0, 100.0),
             (0.005, 0.2),
             0.0
         ),

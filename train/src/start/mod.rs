@@ -126,6 +126,9 @@ const CLOCK: f64 = 170e6;
 /// Cycles of a Cortex-M4F for each multiplication of a network: with assembly at no wait states, and the most of the model in C.
 // `compile --target cortex-m4f` of a network of this size: 13,154 and 26,628 cycles for 5,248
 const CYCLES: [f64; 2] = [2.5, 5.1];
+/// Cycles of the observer, the features and a network of four neurons, the smallest that is of use.
+// `compile --target cortex-m4f` of `examples/plants/buck-48-12.toml` says 162 % of 850 for its soonest build, in i16
+const LEAST_CYCLES: f64 = 1400.0;
 /// Factors on inductance and capacitance at which the policy has to hold as well.
 // what a print allows: inductors are 20 % and film or polymer capacitors 10 to 20 % parts; both off to one side is rarer
 const SPREAD: [f64; 2] = [0.85, 1.15];
@@ -258,10 +261,14 @@ impl Start {
         let cycles = CYCLES.map(|each| each * text::MULTIPLICATIONS as f64);
         let own = CLOCK * self.base.nominal().period;
         (cycles[0] > own).then(|| {
+            let way = match own < LEAST_CYCLES {
+                true => "no network fits there, for observer and features with four neurons take some 1,400: a faster processor or a \
+                         lower f_sw; ",
+                false => "make `hidden` in train.toml smaller, or ",
+            };
             format!(
                 "a step of a network of this size takes some {:.0},000 to {:.0},000 cycles on a Cortex-M4F, and a control period at 170 MHz \
-                 is {own:.0}: make `hidden` in train.toml smaller, or ask `policyc compile --target NAME --clock FREQUENCY` about your \
-                 processor",
+                 is {own:.0}: {way}ask `policyc compile --target NAME --clock FREQUENCY` about your processor",
                 1e-3 * cycles[0],
                 1e-3 * cycles[1]
             )

@@ -53,11 +53,11 @@ pub fn doubts(converter: &Parameters, v_ref: f64, loads: &[Load]) -> Vec<String>
         ));
     }
     let esr = converter.capacitor.esr;
-    let jump = esr * (most - least).max(if loads.len() < 2 { most } else { 0.0 });
+    let step = most - least;
+    let jump = esr * step;
     if jump > SHARE * v_ref {
         doubts.push(format!(
-            "a load step of {:.3} A makes {jump:.3} V at capacitor.esr = {esr} ohm, beside {v_ref} V: is the resistance in ohm",
-            most - least
+            "a load step of {step:.3} A makes {jump:.3} V at capacitor.esr = {esr} ohm, beside {v_ref} V: is the resistance in ohm"
         ));
     }
     let path = converter.inductor.dcr + converter.switch.r_ds_on * duty;

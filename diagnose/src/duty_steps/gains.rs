@@ -20,6 +20,7 @@ const SIMULATED_SHARES: [f64; 2] = [0.9, 1.1];
 const SIMULATED_LEVELS: usize = 32;
 /// Change of the duty that tells a response: as large as a half step of 250 counts.
 const MOVED: f64 = 2e-3;
+
 /// What is looked for, and where.
 pub(super) struct Gains<'a> {
     residual: &'a [f64],

@@ -78,6 +78,15 @@
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
     ctx.font = `${11 * ratio}px ${FONT}`;
+    // beside the line, else on its other side, else further along, as the still picture has them
+    const taken = [];
+    const room = (label, places) => {
+      const width = ctx.measureText(label).width + 12 * ratio, high = 13 * ratio;
+      const isFree = ([x, y]) => taken.every(other => Math.abs(other.y - y) >= high || x <= other.x - other.width || other.x <= x - width);
+      const [x, y] = places.find(isFree) ?? [places[0][0] - taken.reduce((sum, other) => sum + other.width, 0), places[0][1]];
+      taken.push({ x, y, width });
+      return [x, y];
+    };
     for (const { on_x: isX, from, to, label } of marks) {
       const [a, b] = [from, to].map(value => plot.valToPos(value, isX ? "x" : "y", true)).sort((a, b) => a - b);
       ctx.strokeStyle = ctx.fillStyle = ink("--dim");
@@ -95,7 +104,11 @@
       }
       ctx.textAlign = isX ? "left" : "right";
       if (isX) ctx.fillText(label, a + 5 * ratio, bbox.top + 13 * ratio);
-      else ctx.fillText(label, bbox.left + bbox.width - 6 * ratio, a + (from === to ? -4 : 13) * ratio);
+      else {
+        const end = bbox.left + bbox.width - 6 * ratio;
+        const beside = (from === to ? [-4, 13] : [13, 26]).map(by => [end, a + by * ratio]);
+        ctx.fillText(label, ...room(label, beside));
+      }
     }
     ctx.restore();
   };

@@ -116,12 +116,13 @@ pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>
     let mut ran = Ran::default();
     let mut shown = vec![[f64::NAN; CHANNELS]; record.rows()];
     let stripped;
-    let model = match record.duty_is {
+    let (model, trim) = match record.duty_is {
         DutyIs::Applied | DutyIs::Direct => {
             stripped = model.without_chain(record.duty_is == DutyIs::Direct);
-            &stripped
+            // the edges of the gate stand between command and switch as well
+            (&stripped, 0.0)
         }
-        _ => model,
+        _ => (model, begin.trim),
     };
     let mut p = model.plant.clone();
     p.converter.v_in *= record.v_in_ratio;
@@ -132,7 +133,7 @@ pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>
             *sensor = plant::Sensor::default();
         }
     }
-    let longer = trimmed(&mut p, begin.trim);
+    let longer = trimmed(&mut p, trim);
     let (mut whole, mut phase) = sampled(record, model.late / p.t_sw());
     if phase.abs() < SAME {
         phase = 0.0;
@@ -369,4 +370,44 @@ pub(crate) fn sensors(p: &mut Parameters) -> [&mut plant::Sensor; CHANNELS] {
 
 fn array(s: &Signals) -> [f64; CHANNELS] {
     [s.v_out, s.i_l, s.i_out, s.v_in]
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+    use std::path::Path;
+
+    use measured::{ColumnMap, DutyIs, Sheet};
+    use plant::Parameters;
+
+    use super::{Begin, Model, simulate};
+    use crate::record::Record;
+
+    #[test]
+    fn edges_of_the_gate_are_in_an_applied_duty_already() {
+        let model = Parameters::paper_table();
+        let mut text = "t,d,v_o,i_load\n".to_owned();
+        for n in 0..40 {
+            let _ = writeln!(text, "{:.5},0.5,100.{n:02},5", f64::from(n) * 1e-4);
+        }
+        let sheet = Sheet::parse(Path::new("run.csv"), text.into(), &Record::file_options()).unwrap();
+        let record = Record::read(&sheet, &ColumnMap::default(), &model).unwrap();
+        let last = |duty_is: DutyIs, trim: f64| {
+            let record = Record {
+                duty_is,
+                ..record.clone()
+            };
+            let begin = Begin {
+                states: &[[100.0, 5.0, 0.0]],
+                late: &[],
+                levels: &[],
+                trim,
+            };
+            simulate(&Model::new(&model), &record, &begin)[39][0]
+        };
+        // 1e-3 of duty is 0.2 V at rest
+        let moved = |duty_is| last(duty_is, -1e-3) - last(duty_is, 0.0);
+        assert!(moved(DutyIs::Commanded) < -0.05, "{}", moved(DutyIs::Commanded));
+        assert_eq!([DutyIs::Applied, DutyIs::Direct].map(moved), [0.0, 0.0]);
+    }
 }

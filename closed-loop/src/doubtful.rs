@@ -6,8 +6,8 @@ use plant::{Load, Parameters, Topology};
 /// Ripple of the inductor current over the largest current that the loads ask for.
 // a converter is made for 0.2 to 0.5, and at a tenth of its load has ten times that
 const RIPPLE: f64 = 20.0;
-/// Share of the voltage that a load step may make at the capacitor's series resistance, and of the source's that the path of the
-/// current may take.
+/// Share of the voltage that a load step may make at the capacitor's series resistance or a period of the load take off the capacitor,
+/// and of the source's that the path of the current may take.
 // electrolytics and long cables take a tenth or two
 const SHARE: f64 = 0.5;
 /// The filter's resonance over the PWM frequency: from half of it on the filter does not filter.

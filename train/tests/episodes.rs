@@ -161,3 +161,26 @@ fn what_is_no_profile_and_arrays_of_another_length_are_refused() {
     let error = two.step(Actions::Index(&[1]), &[false; 2], given).unwrap_err();
     assert!(error.to_string().contains("as long as there are converters"), "{error}");
 }
+
+#[test]
+fn a_seed_twice_is_refused_and_load_steps_beyond_the_loads_are_told() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/train/paper12.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let twice = Settings::parse(&text.replace("seeds = [0, 1, 2, 3, 4]", "seeds = [3, 1, 3]"), &path).unwrap_err();
+    let said = twice.to_string();
+    assert!(
+        said.contains("names a seed twice") && said.contains("found: 3"),
+        "{said}"
+    );
+    let remarks = |text: &str| {
+        Settings::parse(text, &path)
+            .unwrap()
+            .remarks(&plant::Parameters::paper_model())
+    };
+    assert_eq!(remarks(&text), Vec::<String>::new());
+    let beyond = remarks(&text.replace("[[200, 500], [200, 800]", "[[200, 500], [200, 8000]"));
+    assert!(
+        beyond.len() == 1 && beyond[0].contains("[evaluation] judges at 8000 W"),
+        "{beyond:?}"
+    );
+}

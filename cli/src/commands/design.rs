@@ -25,22 +25,19 @@ pub fn run(options: &arguments::Design) -> Result<Outcome, Failure> {
         }
     };
     let sensor = &plant.sensors.v_out;
-    let noise = match options.noise {
-        None if sensor.noise == 0.0 && sensor.lsb == 0.0 => {
-            let (noise, words) = Wanted::assumed_noise(options.v_ref);
-            talk::note(&words);
-            Some(noise)
-        }
-        given => given,
-    };
+    let is_unknown = options.noise.is_none() && sensor.noise == 0.0 && sensor.lsb == 0.0;
+    let assumed = is_unknown.then(|| Wanted::assumed_noise(options.v_ref));
     let wanted = Wanted {
         v_ref: options.v_ref,
         load: options.load,
-        noise,
+        noise: assumed.as_ref().map(|(noise, _)| *noise).or(options.noise),
         model,
         pole: options.pole,
     };
     let design = Design::new(&plant, wanted).map_err(|faults| faults.in_file(&options.plant))?;
     output::say(design.contract().trim_end())?;
+    if let Some((_, words)) = assumed {
+        talk::note(&words);
+    }
     Ok(Outcome::Done)
 }

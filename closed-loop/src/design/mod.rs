@@ -39,14 +39,23 @@ pub struct Wanted {
     pub pole: Option<f64>,
 }
 
+/// Steps of an assumed converter: 12 bits, which every microcontroller with a PWM timer has.
+pub const STEPS: f64 = 4096.0;
+
+/// Standard deviation of a measurement with steps of `lsb` and this noise before them.
+// a rounding to steps is spread evenly over one: its variance is a twelfth of the square
+#[must_use]
+pub fn measured(lsb: f64, noise: f64) -> f64 {
+    (noise.powi(2) + lsb.powi(2) / 12.0).sqrt()
+}
+
 impl Wanted {
     /// Noise of the measured output voltage where nothing is known of it, V, and what to say of it: a converter of 12 bits that
     /// reaches half as far again as the voltage, with one step of noise.
     #[must_use]
     pub fn assumed_noise(v_ref: f64) -> (f64, String) {
-        let step = 1.5 * v_ref / 4096.0;
-        // a rounding to steps is spread evenly over one: its variance is a twelfth of the square
-        let noise = step * (1.0_f64 + 1.0 / 12.0).sqrt();
+        let step = 1.5 * v_ref / STEPS;
+        let noise = measured(step, step);
         let words = format!(
             "the plant file has neither noise nor lsb in [sensors.v_out]: a converter of 12 bits up to {:.3} V with one step of noise is \
              assumed, {noise:.3e} V; --noise says another",
@@ -193,10 +202,7 @@ fn compute_delay(plant: &Parameters, nominal: &Nominal) -> Result<u32, Error> {
 
 fn noise(plant: &Parameters, wanted: Wanted) -> Result<Noise, Error> {
     let sensor = &plant.sensors.v_out;
-    // a rounding to steps is spread evenly over one: its variance is a twelfth of the square
-    let measured = wanted
-        .noise
-        .unwrap_or_else(|| (sensor.noise.powi(2) + sensor.lsb.powi(2) / 12.0).sqrt());
+    let measured = wanted.noise.unwrap_or_else(|| measured(sensor.lsb, sensor.noise));
     let process = wanted.model.unwrap_or_else(|| Noise::usual(plant));
     let all = [measured, process[0], process[1], process[2]];
     if measured > 0.0 && all.iter().all(|x| x.is_finite() && *x >= 0.0) && process.iter().any(|x| *x > 0.0) {

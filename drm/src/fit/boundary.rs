@@ -55,8 +55,8 @@ fn turning(
     }
     notes.push(format!(
         "{where_}. They count, since the plant file has no dead time. A bench that has one gets its lost duty back there: \
-         write `dead_time` into [switch] (`policyc diagnose` finds it and writes plant.extended.toml) and give that file as \
-         --plant"
+         write `dead_time` into [switch] (`policyc diagnose` finds it and writes plant.extended.toml) and give that file to \
+         `drm fit --plant`"
     ));
     (points.to_vec(), Vec::new())
 }

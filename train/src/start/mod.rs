@@ -11,7 +11,7 @@ mod trial;
 
 use std::path::Path;
 
-use closed_loop::design::{CurrentLaw, Design, Noise, Wanted as Asked, rounded};
+use closed_loop::design::{CurrentLaw, Design, Noise, STEPS, Wanted as Asked, measured, rounded};
 use closed_loop::limit::{Limit, Question};
 use closed_loop::{LoadKind, LoadStep, doubts, holds_power};
 use plant::{Parameters, Sensor, Topology};
@@ -119,8 +119,6 @@ struct Channel {
 /// Largest duty, where the converter leaves it.
 // a driver with a bootstrap capacitor wants some time off
 const LARGEST_DUTY: f64 = 0.95;
-/// Steps of an assumed converter: 12 bits, which every microcontroller with a PWM timer has.
-const STEPS: f64 = 4096.0;
 /// Clock of a usual microcontroller with an FPU and a fast PWM timer, an STM32G4, Hz.
 const CLOCK: f64 = 170e6;
 /// Cycles of a Cortex-M4F for each multiplication of a network: with assembly at no wait states, and the most of the model in C.
@@ -316,7 +314,7 @@ fn measures_inductor(plant: &Parameters) -> bool {
 
 /// Standard deviation of a step and a noise: a rounding is spread evenly over its step.
 fn noise([step, noise]: [f64; 2]) -> f64 {
-    (noise.powi(2) + step.powi(2) / 12.0).sqrt()
+    measured(step, noise)
 }
 
 fn largest_of(limits: &[(LoadStep, Limit)], figure: fn(&Limit) -> f64) -> f64 {

@@ -24,8 +24,14 @@ const HISTORY: usize = 9;
 const AVERAGED: f64 = 100.0;
 /// Periods after which a settled point is taken as it is. Models that are tried may have none: an inductor that keeps a twentieth of its
 /// inductance above a current that the ripple crosses jumps between two states.
-// the slowest point of the plant's own tests takes 9 steps of Newton, of 16 periods each, and 56 where one is in vain; this is 35 of those
+// the slowest point of the plant's own tests takes 9 steps of Newton, of 16 periods each with all its parts, and 56 where one is in vain; this is 35 of those
 const MOST_PERIODS: u32 = 2_000;
+/// Steps of the integrator in a settled point after which it is taken as it is, ...
+// those periods of a circuit of 30 steps a period, which few pass; an inductor that loses most of its inductance within its ripple asks for 600, and 26 points
+// of it took 25 s of a core
+const MOST_STEPS: f64 = 60_000.0;
+/// ... but not before so many periods: twice what the slowest point of the plant's own tests takes.
+const LEAST_PERIODS: f64 = 300.0;
 /// Two instants closer than this share of a period are one: 0.1 ps at 10 kHz, far above the rounding of sums of periods.
 const SAME: f64 = 1e-9;
 
@@ -340,7 +346,9 @@ impl Driver<'_> {
     fn settle(&self, plant: &mut Plant, row: usize, start: &Start, shown: &mut [[f64; CHANNELS]]) -> u64 {
         let (duty, load) = (self.record.duty[row], &self.load[row]);
         plant.reset_within(start[0], start[1], load, &[duty; HISTORY]);
-        let found = plant.rest_within(duty, load, MOST_PERIODS);
+        let steps = plant::steps_per_period(plant.parameters()).max(1.0);
+        let most = (MOST_STEPS / steps).max(LEAST_PERIODS) as u32;
+        let found = plant.rest_within(duty, load, most.min(MOST_PERIODS));
         shown[row] = array(&found.sample.measured);
         u64::from(found.periods)
     }

@@ -1,14 +1,16 @@
 //! What held-out records say against an explanation.
 
+use crate::attribute::Attribution;
 use crate::doubts::Doubt;
 use crate::drive::Model;
-use crate::fit::State;
+use crate::fit::{Fit, State};
 use crate::gain::{self, MUCH_WORSE, Pair, Shift};
 use crate::held_table;
 use crate::level::ACCURACY;
 use crate::noise;
 use crate::problem::Problem;
-use crate::record::{LOAD_CURRENT, Record};
+use crate::record::{CHANNELS, LOAD_CURRENT, Record};
+use crate::words::si;
 
 /// Correlation of neighbours from which on an error is more than noise: a coarser range of the scope or a wild sample leaves none,
 /// and an error that makes a mean square of 2.5 out of one of 1 leaves 1.5 / 2.5 where it is smooth. Half of that.
@@ -18,6 +20,30 @@ const RELATED: f64 = 0.3;
 /// capacitance where records have been (`tests/ceramic.rs`), and a blind case left 1.2 % of the error beyond.
 const OF_CURVE: f64 = 0.03;
 
+/// What kind of causes was found.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Of {
+    /// One is the curve of a part.
+    pub curve: bool,
+    /// One is a gain or an offset of the sensor of a channel.
+    pub sensors: [bool; CHANNELS],
+}
+
+impl Of {
+    /// The causes of a fit.
+    pub fn fit(attribution: &Attribution, fit: &Fit) -> Self {
+        let candidates = || fit.causes.iter().map(|cause| &attribution.candidates[*cause]);
+        let scale = |n: usize| {
+            let sensor = ["v_out", "i_l", "i_out", "v_in"][n];
+            ["gain", "offset"].map(|what| format!("sensors.{sensor}.{what}"))
+        };
+        Of {
+            curve: candidates().any(|candidate| candidate.is_curve()),
+            sensors: std::array::from_fn(|n| candidates().any(|candidate| candidate.changes(&scale(n)))),
+        }
+    }
+}
+
 /// The held-out records with the model as given and with `state`, if there are any.
 pub fn held(problem: &Problem, heldout: &[Record], base: &Model, state: &State, trim: f64) -> Option<Pair> {
     (!heldout.is_empty()).then(|| gain::hold(heldout, base, &state.model, problem.sigma, trim))
@@ -25,18 +51,21 @@ pub fn held(problem: &Problem, heldout: &[Record], base: &Model, state: &State, 
 
 /// What speaks against causes that end at `at`, one doubt for each record: channels in which the extended model leaves much more than in the
 /// training records, though none of it is the same throughout, as a sensor that has shifted would leave. What was found does not hold there.
-/// `of_curve` if a cause is the curve of a part.
-pub fn against(pair: &Pair, training: &Problem, at: &State, of_curve: bool) -> Vec<Doubt> {
-    let accuracy = if of_curve { OF_CURVE } else { ACCURACY };
+/// A sensor that was found to be off may not shift, either: what stood for it in the training records is then no number of that sensor.
+pub fn against(pair: &Pair, training: &Problem, at: &State, found: &Of) -> Vec<Doubt> {
+    let accuracy = if found.curve { OF_CURVE } else { ACCURACY };
     let shifts = pair.shifts(training, at);
     let is_more = |shift: &&Shift| {
         let (index, n) = (shift.index, shift.number);
         // the current that is the load says nothing about the converter
-        if shift.throughout || n == LOAD_CURRENT && pair.problem.records[index].metered.is_some() {
+        if n == LOAD_CURRENT && pair.problem.records[index].metered.is_some() {
             return false;
         }
         let before = noise::left(&noise::channel(&pair.problem, &pair.before.residual, index, n));
         let after = noise::left(&noise::channel(&pair.problem, &pair.after.residual, index, n));
+        if shift.throughout {
+            return found.sensors[n] && after.square > accuracy * accuracy * before.square;
+        }
         // a simulator that is off by its accuracy leaves that share of what was there, in squares, as in `shape`
         let usual = after.square / (shift.ratio * shift.ratio);
         after.lag1.abs() > RELATED && after.square > MUCH_WORSE * usual + accuracy * accuracy * before.square
@@ -57,19 +86,33 @@ pub fn points(pair: &Pair) -> impl Iterator<Item = Doubt> {
 
 /// Said of channels of one record.
 fn not_there(of_record: &[&Shift]) -> String {
-    let Some(first) = of_record.first() else {
-        return String::new();
+    let (moved, far): (Vec<&Shift>, Vec<&Shift>) = of_record.iter().partition(|shift| shift.throughout);
+    let one = |shift: &&Shift| {
+        format!(
+            "{} of the held-out record {} lies {} {} the model with these causes throughout: its sensor, which was found to be off, has \
+             shifted between the records, or its error is another than a gain and an offset",
+            shift.channel,
+            shift.record,
+            si(shift.mean.abs(), shift.unit),
+            if shift.mean > 0.0 { "above" } else { "below" },
+        )
     };
+    let said = moved.iter().map(one).chain(far_off(&far));
+    said.collect::<Vec<_>>().join("; ")
+}
+
+fn far_off(of_record: &[&Shift]) -> Option<String> {
+    let first = of_record.first()?;
     let channels: Vec<&str> = of_record.iter().map(|shift| shift.channel).collect();
     let (are, up_to) = match channels.len() {
         1 => ("is", ""),
         _ => ("are", "up to "),
     };
     let ratio = of_record.iter().map(|shift| shift.ratio).fold(0.0, f64::max);
-    format!(
+    Some(format!(
         "{} of the held-out record {} {are} {up_to}{ratio:.1} times as far from the model with these causes as the training records: \
          they do not hold there",
         channels.join(", "),
         first.record
-    )
+    ))
 }

@@ -1,13 +1,12 @@
 //! Held-out records as judges of what training records say.
 
-use crate::attribute::Attribution;
 use crate::doubts::Doubt;
 use crate::drive::Model;
 use crate::examine::{Examined, named};
 use crate::findings::Verdict;
 use crate::fit::Fit;
 use crate::gain::Pair;
-use crate::held_out::{against, held, points};
+use crate::held_out::{Of, against, held, points};
 use crate::left_open::{self, Chosen};
 use crate::level::threshold;
 use crate::record::Record;
@@ -37,12 +36,9 @@ impl Examined {
             Verdict::Consistent => points(&pair).collect(),
             // what is no more than the step of a converter has no values that could fail to hold
             Verdict::Explained | Verdict::Ambiguous if !self.named.is_empty() => {
-                let of_curve = self
-                    .attribution
-                    .best
-                    .as_ref()
-                    .map(|best| of_curve(&self.attribution, best));
-                against(&pair, &self.problem, found, of_curve.unwrap_or(false))
+                let best = self.attribution.best.as_ref();
+                let of = best.map(|best| Of::fit(&self.attribution, best));
+                against(&pair, &self.problem, found, &of.unwrap_or_default())
             }
             _ => Vec::new(),
         };
@@ -104,7 +100,7 @@ impl Examined {
             let trim = state.starts.trim_or_none(base.plant.converter.f_sw);
             let pair = held(&self.problem, heldout, base, state, trim)?;
             let holds =
-                leaves.is_empty() && against(&pair, &self.problem, state, of_curve(attribution, rival)).is_empty();
+                leaves.is_empty() && against(&pair, &self.problem, state, &Of::fit(attribution, rival)).is_empty();
             holds.then(|| (member, rival.clone(), pair))
         };
         let held = rivals::in_one_place(attribution).filter_map(holding);
@@ -133,9 +129,4 @@ impl Examined {
         self.odd.push(chosen.words);
         chosen.pair
     }
-}
-
-/// Whether one of the causes of a fit is the curve of a part.
-fn of_curve(attribution: &Attribution, fit: &Fit) -> bool {
-    fit.causes.iter().any(|cause| attribution.candidates[*cause].is_curve())
 }

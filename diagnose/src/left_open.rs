@@ -10,7 +10,7 @@ use crate::causes::{Cut, Search};
 use crate::drive::Model;
 use crate::fit::Fit;
 use crate::gain::Pair;
-use crate::held_out::{against, held};
+use crate::held_out::{Of, against, held};
 use crate::parallel;
 use crate::problem::Problem;
 use crate::profile::Profile;
@@ -89,11 +89,7 @@ pub fn chosen(
         }
         let trim = fit.state.starts.trim_or_none(base.plant.converter.f_sw);
         let pair = held(problem, heldout, base, &fit.state, trim)?;
-        let of_curve = best
-            .causes
-            .iter()
-            .any(|cause| attribution.candidates[*cause].is_curve());
-        against(&pair, problem, &fit.state, of_curve)
+        against(&pair, problem, &fit.state, &Of::fit(attribution, best))
             .is_empty()
             .then_some((*number, fit, pair))
     });

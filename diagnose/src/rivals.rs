@@ -224,16 +224,25 @@ pub fn widen(attribution: &Attribution, profiles: &mut [Profile]) {
         return;
     }
     for rival in attribution.rivals.iter().flatten() {
-        let own =
-            (rival.causes.iter()).flat_map(|cause| (0..attribution.candidates[*cause].own.len()).map(|k| (*cause, k)));
-        for (number, place) in own.enumerate() {
-            let Some(profile) = places.iter().position(|known| *known == place) else {
+        let mut first = 0;
+        for cause in &rival.causes {
+            let candidate = &attribution.candidates[*cause];
+            let ranges = candidate.ranges.iter().enumerate();
+            let own: Vec<[f64; 2]> = ranges
+                .map(|(k, range)| interval(attribution, rival, first + k, *range))
+                .collect();
+            first += own.len();
+            // beside another it may be nothing, and that other is what stands in its place
+            let mut sizes = own.iter().zip(&candidate.own).take(candidate.sizes());
+            if candidate.sizes() > 0 && sizes.all(|([low, high], own)| (low..=high).contains(&own)) {
                 continue;
-            };
-            let range = attribution.candidates[place.0].ranges[place.1];
-            let [low, high] = interval(attribution, rival, number, range);
-            let interval = &mut profiles[profile].interval;
-            *interval = [interval[0].min(low), interval[1].max(high)];
+            }
+            for (k, [low, high]) in own.into_iter().enumerate() {
+                if let Some(profile) = places.iter().position(|known| *known == (*cause, k)) {
+                    let interval = &mut profiles[profile].interval;
+                    *interval = [interval[0].min(low), interval[1].max(high)];
+                }
+            }
         }
     }
 }

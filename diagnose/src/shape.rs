@@ -119,6 +119,14 @@ fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &
     if let Some(line) = line {
         let of_line = of_line(&line);
         let place = place.filter(|_| of_line < OF_EXCESS);
+        if of_line < OF_EXCESS && place.is_none() {
+            // what trembles has a strongest frequency as well
+            return format!(
+                "a trembling that is strongest about {:.0} Hz ({:.0} % of the power there)",
+                line.frequency,
+                100.0 * line.share
+            );
+        }
         return format!(
             "a line at {:.0} Hz of {:.3} ({:.0} % of the power){}",
             line.frequency,

@@ -115,6 +115,37 @@ fn a_page_of_a_model_that_has_no_finite_value_says_so_and_draws_the_rest() {
     assert!(page.contains("dcr"));
 }
 
+/// A voltmeter whose error bends at 115 V has a gain and an offset in training records below it, which are none of its above.
+#[test]
+fn a_gain_and_an_offset_that_shift_in_a_held_out_record_are_no_explanation() {
+    let bent = |name: &str, bench: &Bench, seed: u64| {
+        let mut record = record(name, bench, seed);
+        for value in &mut record.measured[0] {
+            *value += 0.05 * value.min(115.0) - 3.0;
+        }
+        record
+    };
+    let right = Bench {
+        dcr: model().inductor.dcr,
+        duty: vec![(0, 0.5), (60, 0.47), (120, 0.51), (180, 0.48)],
+        ..duty_steps()
+    };
+    let higher = Bench {
+        duty: vec![(0, 0.68), (60, 0.64), (120, 0.7), (180, 0.66)],
+        ..right.clone()
+    };
+    let train = vec![bent("train", &right, 3)];
+    let findings = diagnose(&model(), train, &[bent("held", &higher, 4)], &|_| ()).findings;
+    println!("{}", findings.sentence);
+    assert_eq!(findings.verdict, Verdict::Unexplained);
+    assert!(
+        findings
+            .doubts
+            .iter()
+            .any(|doubt| doubt.contains("another than a gain and an offset"))
+    );
+}
+
 /// Noise of twice the size, as of a coarser range of the scope, is no sign that the winding has another resistance.
 #[test]
 fn what_holds_in_a_noisier_held_out_record_stays_explained() {

@@ -26,6 +26,7 @@ use serde::{Deserialize, Serialize};
 
 use self::few::{Few, LAGGED};
 use crate::catalogue;
+use crate::effects::core_loss;
 use crate::entry::Way;
 use crate::lag;
 use crate::parameters::Parameters;
@@ -80,6 +81,11 @@ fn all() -> f64 {
     1.0
 }
 
+/// A state stored before there was another law.
+fn linear() -> bool {
+    true
+}
+
 /// The circuit's constants.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Full {
@@ -93,6 +99,9 @@ pub(crate) struct Full {
     is_wired: bool,
     /// 1 / L, 1 / C of parts that change with neither current nor voltage.
     linear: [Option<f64>; 2],
+    /// Whether the core's conductance is the same at every voltage.
+    #[serde(default = "linear")]
+    is_core_linear: bool,
     low_pass: [f64; 4],
     /// Fastest rate that does not depend on the load, in steps per second.
     rate: f64,
@@ -114,7 +123,7 @@ struct Algebra<const N: usize> {
 /// Whether a matrix takes the circuit over a step, of `rate` steps a second without it.
 fn is_affine(p: &Parameters, rate: f64) -> bool {
     let is_fast = p.cable.inductance > 0.0 || has_c_in(p) && rate * p.t_sw() > MANY_STEPS;
-    let is_linear = p.inductor.saturation == 0.0 && p.capacitor.derating == 0.0;
+    let is_linear = p.inductor.saturation == 0.0 && p.capacitor.derating == 0.0 && core_loss::is_linear(p);
     is_fast && is_linear && p.source.ripple == 0.0
 }
 
@@ -142,6 +151,7 @@ impl Full {
         Full {
             p: p.clone(),
             linear,
+            is_core_linear: core_loss::is_linear(p),
             has_cable,
             has_c_in: has_c_in(p),
             has_lag,
@@ -170,6 +180,18 @@ impl Full {
         let shown = [v_out, i_l, i_out, v_in];
         x[SHOWN..].copy_from_slice(&shown);
         x
+    }
+
+    /// Whether a state ever changes: it is that of a part which is there.
+    pub fn moves(&self, state: usize) -> bool {
+        match state {
+            I_L | V_C => true,
+            I_CABLE | V_LOAD => self.has_cable,
+            I_CPL => self.has_lag,
+            V_CIN => self.has_c_in,
+            I_SOURCE => self.has_c_in && self.p.source.inductance > 0.0,
+            low_pass => self.low_pass[low_pass - SHOWN] != 0.0,
+        }
     }
 
     /// Lets the low-passes of the sensors hold these outputs; those that are no number stay.

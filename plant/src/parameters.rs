@@ -244,6 +244,8 @@ table! {
         steepness: f64,
         /// Conductance across the inductance that stands for the core loss, S.
         core_conductance: f64,
+        /// Power of the voltage with which that loss grows, 1.
+        core_exponent: f64,
     }
 }
 

@@ -202,9 +202,17 @@ impl Plant {
                     periods: periods + 1 + WARM_UP,
                 };
             }
-            periods += 1 + STATES as u32;
             let mut jacobian = [[0.0; STATES]; STATES];
+            for (n, line) in jacobian.iter_mut().enumerate() {
+                // of a part that is not there
+                line[n] = 1.0;
+            }
+            periods += 1;
             for column in 0..STATES {
+                if !self.full.moves(column) {
+                    continue;
+                }
+                periods += 1;
                 let mut nudged = before;
                 let step = NUDGE * (1.0 + nudged.x[column].abs());
                 nudged.x[column] += step;

@@ -179,7 +179,14 @@ fn inductor(n: &mut String, p: &Parameters, i_l: f64) {
     } else {
         let _ = writeln!(n, "L1 {from} x1 {l:e} ic={i_l}");
     }
-    if i.core_conductance > 0.0 {
+    if i.core_conductance > 0.0 && i.core_exponent != 2.0 {
+        let (g, v_in, more) = (i.core_conductance, p.converter.v_in, i.core_exponent - 2.0);
+        let _ = writeln!(
+            n,
+            // a slope without bound at no voltage ends with "timestep too small"
+            "Bcore {from} x1 I={g:e}*V({from},x1)*max(abs(V({from},x1))/{v_in:e},0.001)^{more:e}"
+        );
+    } else if i.core_conductance > 0.0 {
         let _ = writeln!(n, "Rcore {from} x1 {:e}", 1.0 / i.core_conductance);
     }
     let _ = writeln!(n, "Vil x1 x2 0\nRl x2 {to} {:e}", i.dcr.max(1e-6));

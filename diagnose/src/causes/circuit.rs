@@ -213,15 +213,34 @@ pub(super) const C_DERATING: Cause = Cause {
 pub(super) const CORE_LOSS: Cause = Cause {
     id: "core_loss",
     kind: Kind::Part,
-    forms: &[searched(
-        "conductance across the inductance",
-        &[knob(
-            "core_conductance",
-            &["inductor.core_conductance"],
-            // half of the load's power: more than any core takes that a bench goes on with
-            Reach::LossAcross(0.5, 0.0015),
-        )],
-        // at none the response of a current that rests has a corner. A convention: a twentieth of what is tried
-        Search::OwnOr(&[&[15.0]]),
-    )],
+    forms: &[
+        searched(
+            "conductance across the inductance",
+            &[knob(
+                "core_conductance",
+                &["inductor.core_conductance"],
+                // half of the load's power: more than any core takes that a bench goes on with
+                Reach::LossAcross(0.5, 0.0015),
+            )],
+            // at none the response of a current that rests has a corner. A convention: a twentieth of what is tried
+            Search::OwnOr(&[&[15.0]]),
+        ),
+        searched(
+            "core loss that grows with another power of the voltage",
+            &[
+                // at the source's voltage, which may be several times what stands across the inductance: with a high power more than it takes
+                knob(
+                    "core_conductance",
+                    &["inductor.core_conductance"],
+                    Reach::LossAcross(2.0, 0.0015),
+                ),
+                knob(
+                    "core_exponent",
+                    &["inductor.core_exponent"],
+                    Reach::Plain(1.0, 4.0, 0.1),
+                ),
+            ],
+            Search::From(&[&[20.0, 15.0], &[40.0, 30.0]]),
+        ),
+    ],
 };

@@ -1,7 +1,7 @@
 //! What follows from the states at once: both algebraic voltages, the currents, the slopes.
 
 use super::{Algebra, FEW, Full, I_CABLE, I_CPL, I_L, I_SOURCE, Path, V_C, V_CIN, V_LOAD};
-use crate::effects::{dcr, derating, input_ripple, saturation};
+use crate::effects::{core_loss, dcr, derating, input_ripple, saturation};
 use crate::signals::{Load, Signals};
 
 impl Full {
@@ -40,10 +40,14 @@ impl Full {
         let v_source = p.converter.v_in + input_ripple::voltage(&p.source, t);
         let (v_th, r_th) = self.thevenin(x, v_source);
         let r = path.r + path.share * r_th + dcr::in_series(&p.inductor) + self.apart(path, load);
-        let core = p.inductor.core_conductance;
         // v_l = (drive - give v_out) / (1 + r core), i_b = i_l + core v_l; nothing of it while no current flows
         let i_l = if path.open { 0.0 } else { x[I_L] };
         let drive = path.share * v_th + path.emf - r * i_l;
+        let core = match self.is_core_linear {
+            true => p.inductor.core_conductance,
+            // but for what its own current and the ESR drop, hundredths of that voltage
+            false => core_loss::conductance(p, drive - path.give * x[V_C]),
+        };
         let shrunk = if core == 0.0 { 1.0 } else { 1.0 / (1.0 + r * core) };
         let reflected = match path.open {
             true => 0.0,

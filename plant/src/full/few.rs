@@ -40,13 +40,14 @@ pub(super) struct Few<'a> {
 }
 
 impl<'a> Few<'a> {
-    /// Nothing if there are other states, or the source ripples, or a current that changes the inductance acts on the output at once.
+    /// Nothing if there are other states, the source ripples, the core is of another law than a conductor, or a current that changes the inductance acts on the output at once.
     #[inline]
     pub fn new(full: &'a Full, path: &Path, load: &'a Load) -> Option<Self> {
         let p = &full.p;
         let [per_l, per_c] = full.linear;
         let acts_at_once = per_l.is_none() && p.capacitor.esl != 0.0;
-        if full.has_cable || full.has_c_in || p.source.ripple != 0.0 || acts_at_once {
+        let is_other = full.has_cable || full.has_c_in || !full.is_core_linear;
+        if is_other || p.source.ripple != 0.0 || acts_at_once {
             return None;
         }
         let (v_source, r_th) = (p.converter.v_in, p.source.resistance);

@@ -202,6 +202,12 @@ pub fn effects() -> Vec<Effect> {
         steady("inductor resistance", |p| p.inductor.dcr = 0.5),
         steady("saturation", |p| (p.inductor.saturation, p.inductor.i_sat) = (0.5, 6.0)),
         steady("core loss", |p| p.inductor.core_conductance = 2e-4),
+        steady("core loss of another power", |p| {
+            (p.inductor.core_conductance, p.inductor.core_exponent) = (1e-3, 3.0);
+        }),
+        steady("core loss of a low power", |p| {
+            (p.inductor.core_conductance, p.inductor.core_exponent) = (2e-4, 1.7);
+        }),
         light("core loss, DCM", |p| p.inductor.core_conductance = 2e-4),
         steady("ESR", |p| p.capacitor.esr = 0.2),
         steady("derating", |p| (p.capacitor.derating, p.capacitor.v_half) = (0.6, 90.0)),

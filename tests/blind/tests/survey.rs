@@ -301,4 +301,10 @@ fn records_that_misled_once_have_their_answer() {
         let found = survey(1_795_731_871_201_373_090, group, number..number + 1, (60.0, usize::MAX));
         assert_eq!(found.get("right"), Some(&1), "{group:?} {number}: {found:?}");
     }
+    // a core of another power, whose rest was a late sensor, is found; a bent voltmeter is no gain and no offset where held out it shifts
+    for (number, answer) in [(22, "right by cause"), (83, "right")] {
+        let seed = 1_795_963_070_261_140_255;
+        let found = survey(seed, Group::Unlisted, number..number + 1, (60.0, usize::MAX));
+        assert_eq!(found.get(answer), Some(&1), "{number}: {found:?}");
+    }
 }

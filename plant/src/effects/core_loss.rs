@@ -2,8 +2,8 @@
 //!
 //! A current step of `g v_in` at every edge, and slightly more damping. When the winding current ends (DCM), what the
 //! inductance still holds (`g v_out`, milliamperes) is lost in the core at once.
-//! n is the power of the voltage with which the loss grows: 2 for a conductor. In Steinmetz's law, where the flux swings by a fixed share, the
-//! loss of a ferrite grows with its power of 1.2 to 1.8 in an edge of given height, and with one of 2.2 to 2.8 in that height.
+//! n is the power of the voltage with which the loss grows: 2 for a conductor. Steinmetz's law has another one, and cores of transformers and
+//! inductors follow it with powers between those of the slope of their flux and of its swing, from below 2 to 3.
 
 use crate::entry::{Effect, Way, detail, number};
 use crate::parameters::Parameters;

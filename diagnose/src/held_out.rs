@@ -9,7 +9,7 @@ use crate::held_table;
 use crate::level::ACCURACY;
 use crate::noise;
 use crate::problem::Problem;
-use crate::record::{CHANNELS, LOAD_CURRENT, Record};
+use crate::record::{CHANNELS, LOAD_CURRENT, QUANTITIES, Record};
 use crate::words::si;
 
 /// Correlation of neighbours from which on an error is more than noise: a coarser range of the scope or a wild sample leaves none,
@@ -33,10 +33,7 @@ impl Of {
     /// The causes of a fit.
     pub fn fit(attribution: &Attribution, fit: &Fit) -> Self {
         let candidates = || fit.causes.iter().map(|cause| &attribution.candidates[*cause]);
-        let scale = |n: usize| {
-            let sensor = ["v_out", "i_l", "i_out", "v_in"][n];
-            ["gain", "offset"].map(|what| format!("sensors.{sensor}.{what}"))
-        };
+        let scale = |n: usize| ["gain", "offset"].map(|what| format!("sensors.{}.{what}", QUANTITIES[n]));
         Of {
             curve: candidates().any(|candidate| candidate.is_curve()),
             sensors: std::array::from_fn(|n| candidates().any(|candidate| candidate.changes(&scale(n)))),

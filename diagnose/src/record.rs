@@ -22,8 +22,9 @@ use measured::{ColumnMap, DutyIs, Options, Sampled, Sheet};
 use plant::{Load, Parameters};
 use toml_input::{Faults, FileName, Message, Sink};
 
+use channels::FEWEST;
+pub(crate) use channels::QUANTITIES;
 pub use channels::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, LOAD_CURRENT, Segment, V_IN};
-use channels::{FEWEST, QUANTITIES};
 pub use levels::{Level, Part};
 use raw::Raw;
 pub(crate) use source::Source;

@@ -9,7 +9,7 @@ pub const V_IN: usize = 3;
 /// Their names.
 pub const CHANNEL_NAMES: [&str; CHANNELS] = ["v_o", "i_l", "i_o", "v_in"];
 /// What the columns of a table call them.
-pub(super) const QUANTITIES: [&str; CHANNELS] = ["v_out", "i_l", "i_out", "v_in"];
+pub(crate) const QUANTITIES: [&str; CHANNELS] = ["v_out", "i_l", "i_out", "v_in"];
 /// Their units.
 pub const CHANNEL_UNITS: [&str; CHANNELS] = ["V", "A", "A", "V"];
 

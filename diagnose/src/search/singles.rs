@@ -85,7 +85,7 @@ impl Searcher<'_> {
             .min_by(|a, b| a.1.state.chi2.total_cmp(&b.1.state.chi2))?;
         let is_listed = matches!(self.search(cause), Search::From(_)) && best.values.len() >= MANY;
         let share = best.state.chi2 / self.fitter.null.chi2;
-        if !is_listed || share > NEARLY_ALL || self.structure(best) == 0.0 {
+        if !is_listed || share > NEARLY_ALL || self.structure(best) == 0.0 || !self.fitter.problem.work.goes_on() {
             return None;
         }
         let [low, high, _] = self.fitter.candidates[cause].ranges[0];

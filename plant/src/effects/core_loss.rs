@@ -2,11 +2,11 @@
 //!
 //! A current step of `g v_in` at every edge, and slightly more damping. When the winding current ends (DCM), what the
 //! inductance still holds (`g v_out`, milliamperes) is lost in the core at once.
-//! n is the power of the voltage with which the loss grows: 2 for a conductor. Steinmetz's law has another one, and cores of transformers and
-//! inductors follow it with powers between those of the slope of their flux and of its swing, from below 2 to 3.
+//! n is the power of the voltage with which the loss grows: 2 for a conductor, another one for a core that follows Steinmetz's law. Mean values
+//! over a period know no voltage of an interval: the averaged model has the conductor.
 
 use crate::entry::{Effect, Way, detail, number};
-use crate::parameters::Parameters;
+use crate::parameters::{Model, Parameters};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
@@ -42,7 +42,8 @@ const LEAST: f64 = 1e-3;
 /// Whether the conductance is the same at every voltage.
 #[inline]
 pub(crate) fn is_linear(p: &Parameters) -> bool {
-    p.inductor.core_conductance == 0.0 || p.inductor.core_exponent == 2.0
+    let is_mean = p.converter.model == Model::Averaged;
+    is_mean || p.inductor.core_conductance == 0.0 || p.inductor.core_exponent == 2.0
 }
 
 /// The conductance at a voltage `v` across the inductance, S.
@@ -56,7 +57,7 @@ pub(crate) fn conductance(p: &Parameters, v: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::{conductance, is_linear};
-    use crate::parameters::Parameters;
+    use crate::parameters::{Model, Parameters};
 
     #[test]
     fn the_loss_grows_with_its_power_of_the_voltage() {
@@ -71,5 +72,7 @@ mod tests {
             assert!((loss(24.0) / loss(12.0) / 2.0_f64.powf(exponent) - 1.0).abs() < 1e-12);
             assert!(conductance(&p, 0.0).is_finite() && !is_linear(&p));
         }
+        p.converter.model = Model::Averaged;
+        assert!(is_linear(&p));
     }
 }

@@ -40,7 +40,8 @@ pub(super) struct Few<'a> {
 }
 
 impl<'a> Few<'a> {
-    /// Nothing if there are other states, the source ripples, the core is of another law than a conductor, or a current that changes the inductance acts on the output at once.
+    /// Nothing if there are other states, the source ripples, the core is of another law than a conductor, or a current that changes the
+    /// inductance acts on the output at once.
     #[inline]
     pub fn new(full: &'a Full, path: &Path, load: &'a Load) -> Option<Self> {
         let p = &full.p;

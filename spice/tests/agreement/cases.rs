@@ -208,6 +208,13 @@ pub fn effects() -> Vec<Effect> {
         steady("core loss of a low power", |p| {
             (p.inductor.core_conductance, p.inductor.core_exponent) = (2e-4, 1.7);
         }),
+        steady("core loss, ESR", |p| {
+            (p.inductor.core_conductance, p.capacitor.esr) = (2e-4, 0.2)
+        }),
+        steady("core loss of another power, ESR", |p| {
+            (p.inductor.core_conductance, p.inductor.core_exponent) = (2e-4, 3.0);
+            p.capacitor.esr = 0.2;
+        }),
         light("core loss, DCM", |p| p.inductor.core_conductance = 2e-4),
         steady("ESR", |p| p.capacitor.esr = 0.2),
         steady("derating", |p| (p.capacitor.derating, p.capacitor.v_half) = (0.6, 90.0)),

@@ -95,6 +95,7 @@ impl Model {
         // what stands between command and switch is in the column already
         (p.pwm.duty_delay, p.pwm.duty_lsb, p.pwm.min_on_time) = (0, 0.0, 0.0);
         (p.switch.dead_time, p.switch.turn_on_delay, p.switch.turn_off_delay) = (0.0, 0.0, 0.0);
+        p.switch.node_capacitance = 0.0;
         model.late = 0.0;
         model
     }

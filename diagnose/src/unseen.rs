@@ -8,9 +8,11 @@ use crate::findings::Hidden;
 use crate::problem::Problem;
 use crate::record::CHANNELS;
 
-/// Whether the circuit has what these keys change: the diodes of a synchronous leg conduct in its dead time alone.
+/// Whether the circuit has what these keys change: the diodes of a synchronous leg conduct in its dead time alone, and its node waits in that alone.
 fn conducts(plant: &Parameters, keys: &[&str]) -> bool {
-    let is_of_diode = keys.iter().any(|key| ["switch.v_f", "switch.r_d"].contains(key));
+    let is_of_diode = keys
+        .iter()
+        .any(|key| ["switch.v_f", "switch.r_d", "switch.node_capacitance"].contains(key));
     let has_diode = plant.converter.rectifier == Rectifier::Diode || plant.switch.dead_time > 0.0;
     has_diode || !is_of_diode
 }

@@ -72,10 +72,11 @@ impl GateTiming {
 }
 
 /// What conducts, as far as the gates decide it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub(crate) enum Gate {
     Main,
     Second,
+    #[default]
     Neither,
 }
 

@@ -1,10 +1,12 @@
 //! What the inductor is connected to in each state of the leg.
 
+use crate::effects::node_capacitance::Ramp;
 use crate::effects::{dcr, dead_time, switch_delay};
 use crate::full::Path;
 use crate::gates::Gate;
 use crate::parameters::{Parameters, Rectifier};
 use crate::plain::Drive;
+use crate::signals::Signals;
 use crate::topology::Shares;
 
 /// The paths of the inductor current, for both integrators.
@@ -113,6 +115,34 @@ impl Legs {
             // no current would begin
             false if self.starts && used == 0.0 => Some(Path::OPEN),
             false => None,
+        }
+    }
+
+    /// The paths of a current that leaves `from` when that switch opens: before, and behind the ramp of the node.
+    pub fn sides(&self, from: Gate) -> [&Path; 2] {
+        match from {
+            Gate::Second => [&self.paths[1], &self.paths[3]],
+            _ => [&self.paths[0], &self.paths[2]],
+        }
+    }
+
+    /// Voltage at the inductance along a path, V.
+    pub fn v_l(&self, path: &Path, i: f64, signals: &Signals) -> f64 {
+        path.share * signals.v_in + path.emf - (path.r + self.dcr) * i - path.give * signals.v_out
+    }
+
+    /// The path while the node is between both sides: the output gets what both give it, and the source gives what the node takes.
+    pub fn ramp(&self, ramp: &Ramp, i: f64, signals: &Signals) -> Path {
+        let [on, off] = [&self.paths[0], &self.paths[1]];
+        let share = match ramp.from {
+            Gate::Second => on.share.min(off.share),
+            _ => on.share,
+        };
+        let shares = (share, on.give.min(off.give));
+        let path = Path::closed(shares, 0.0, 0.0, 0.0);
+        Path {
+            emf: ramp.v_l - self.v_l(&path, i, signals),
+            ..path
         }
     }
 

@@ -280,6 +280,8 @@ table! {
         turn_on_delay: f64,
         /// From the command to no current when turning off, s.
         turn_off_delay: f64,
+        /// Capacitance at the switching node, F.
+        node_capacitance: f64,
     }
 }
 

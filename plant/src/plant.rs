@@ -8,6 +8,7 @@ use crate::catalogue;
 use crate::check::check;
 use crate::effects::duty_delay::{self, Queue};
 use crate::effects::empirical::Correction;
+use crate::effects::node_capacitance::{Edge, Node};
 use crate::effects::{dcr, duty_offset, duty_quantisation, load_setting, minimum_on_time};
 use crate::entry::Way;
 use crate::full::{Full, Path, States, beside};
@@ -29,6 +30,7 @@ pub struct Plant {
     pub(crate) legs: Legs,
     pub(crate) full: Full,
     pub(crate) timing: GateTiming,
+    pub(crate) node: Node,
     pub(crate) sensing: Sensing,
     correction: Correction,
     /// How it has to be computed.
@@ -45,6 +47,8 @@ pub struct PlantState {
     pub(crate) path: Path,
     pub(crate) time: f64,
     pub(crate) gates: Gates,
+    #[serde(default)]
+    pub(crate) edge: Edge,
     pub(crate) queue: Queue,
     pub(crate) applied: f64,
     #[serde(default)]
@@ -74,6 +78,7 @@ impl Plant {
             correction: Correction::new(p),
             way: catalogue::way(p),
             timing,
+            node: Node::new(p),
             sensing,
             parameters: p.clone(),
             longer: 0.0,
@@ -83,6 +88,7 @@ impl Plant {
                 path: Path::OPEN,
                 time: 0.0,
                 gates: Gates::default(),
+                edge: Edge::default(),
                 queue: Queue::default(),
                 applied: 0.0,
                 slow: 0.0,
@@ -143,6 +149,7 @@ impl Plant {
         let converter = &self.parameters.converter;
         let duty = converter.topology.duty(converter.v_in, v_out);
         let x = self.initial(v_out, i_l, &drawn, duty);
+        let edge = self.node.behind(self.is_on(duty));
         let state = &mut self.state;
         state.x = x;
         state.path = Path::OPEN;
@@ -155,6 +162,7 @@ impl Plant {
         if self.parameters.pwm.sampling_phase > 0.0 {
             state.gates.plan(&self.timing, duty);
         }
+        state.edge = edge;
         let signals = Signals {
             v_out,
             i_l,
@@ -169,12 +177,14 @@ impl Plant {
     fn initial(&self, v_out: f64, i_l: f64, drawn: &Load, duty: f64) -> States {
         let give = match self.parameters.converter.model {
             Model::Averaged => self.legs.averaged(duty).give,
-            Model::Switched => {
-                let on = self.timing.is_on_before(duty, self.parameters.pwm.sampling_phase);
-                self.legs.steady(on).give
-            }
+            Model::Switched => self.legs.steady(self.is_on(duty)).give,
         };
         self.full.initial(v_out, i_l, drawn, give)
+    }
+
+    /// Whether the switch is on at the sampling instant where `duty` is in force.
+    fn is_on(&self, duty: f64) -> bool {
+        self.timing.is_on_before(duty, self.parameters.pwm.sampling_phase)
     }
 
     /// [`Plant::reset_at`] in the middle of a run: `commanded` are the duties given before, the latest last. The one in
@@ -204,6 +214,7 @@ impl Plant {
         // which switch is on at the sampling instant the duty in force decides, and with it what of the output voltage is the ESR's
         let drawn = load_setting::drawn(&self.parameters.load, load);
         self.state.x = self.initial(v_out, i_l, &drawn, self.state.applied);
+        self.state.edge = self.node.behind(self.is_on(self.state.applied));
         sample
     }
 

@@ -10,6 +10,7 @@
 
 use crate::entry::Way;
 use crate::full::{Full, Path};
+use crate::gates::Gate;
 use crate::parameters::Model;
 use crate::plain::Track;
 use crate::plant::Plant;
@@ -93,29 +94,60 @@ impl Plant {
         // asked in the middle: at an end of the interval rounding would decide on which side of an edge it lies
         let gate = self.state.gates.at(&self.timing, t + 0.5 * h);
         let (mut rest, mut next) = (h, None);
+        let is_switched = self.parameters.converter.model == Model::Switched;
         while rest > 0.0 {
+            if self.node.is_there()
+                && is_switched
+                && let Some((path, whole)) = self.ramp(gate, load)
+            {
+                let used = self.follow(&path, load, whole.min(rest), track);
+                see(&path, used);
+                self.state.edge.pass(used);
+                (rest, next) = (rest - used, None);
+                continue;
+            }
             let path = match (self.parameters.converter.model, next) {
                 (Model::Averaged, _) => self.legs.averaged(self.state.applied),
                 (Model::Switched, Some(path)) => path,
                 (Model::Switched, None) => self.legs.path(gate, self.state.x[0], self.above(load)),
             };
-            let used = if self.way < Way::Full {
-                let mut x = (self.state.x[0], self.state.x[1]);
-                let used = self.plain.advance(&mut x, &self.legs.drive(&path), load, rest, track);
-                (self.state.x[0], self.state.x[1]) = x;
-                track.discontinuous |= path.open;
-                used
-            } else {
-                let span = (self.state.time, rest);
-                self.full.advance(&mut self.state.x, &path, load, span, track)
-            };
+            let used = self.follow(&path, load, rest, track);
             see(&path, used);
-            self.state.path = path;
-            self.state.time += used;
+            if gate == Gate::Neither {
+                self.state.edge.pass(used);
+            }
             // only a diode ends its interval early; what is left then runs with an open leg
             rest = if path.only != 0.0 { rest - used } else { 0.0 };
             next = self.legs.after(&path, used);
         }
+    }
+
+    /// Advances by `h` along a path, or until that ends by itself. Returns the time used.
+    fn follow(&mut self, path: &Path, load: &Load, h: f64, track: &mut Track) -> f64 {
+        let used = if self.way < Way::Full {
+            let mut x = (self.state.x[0], self.state.x[1]);
+            let used = self.plain.advance(&mut x, &self.legs.drive(path), load, h, track);
+            (self.state.x[0], self.state.x[1]) = x;
+            track.discontinuous |= path.open;
+            used
+        } else {
+            let span = (self.state.time, h);
+            self.full.advance(&mut self.state.x, path, load, span, track)
+        };
+        self.state.path = *path;
+        self.state.time += used;
+        used
+    }
+
+    /// The path of a node between both sides, and for how long it goes on; nothing if the node is at one of them.
+    fn ramp(&mut self, gate: Gate, load: &Load) -> Option<(Path, f64)> {
+        let i = self.state.x[0];
+        let signals = self.signals(load);
+        let legs = &self.legs;
+        let ramp = self.node.ramp(&mut self.state.edge, gate, i, |from| {
+            legs.sides(from).map(|path| legs.v_l(path, i, &signals))
+        })?;
+        Some((self.legs.ramp(&ramp, i, &signals), ramp.rest))
     }
 
     /// How far the output lies above the source while no current flows, V; asked only where a current could begin.

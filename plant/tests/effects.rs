@@ -305,6 +305,7 @@ fn a_checkpoint_continues_to_the_bit() {
     let p = changed(|p| {
         (p.sensors.v_out.noise, p.sensors.i_l.delay, p.pwm.duty_delay) = (0.1, 5e-5, 2);
         (p.capacitor.esr, p.load.cpl_time_constant, p.switch.turn_off_delay) = (0.05, 1e-4, 1e-6);
+        p.switch.node_capacitance = 2e-8;
     });
     let mut plant = plant(&p);
     plant.reset_at(100.0, 3.0, &LOAD);

@@ -64,7 +64,7 @@ pub fn netlist(circuit: &Circuit<'_>) -> String {
         Topology::Boost => 1.0,
     };
     source(&mut n, p, circuit.i_l * share);
-    leg(&mut n, p);
+    leg(&mut n, circuit);
     inductor(&mut n, p, circuit.i_l);
     capacitor(&mut n, circuit);
     load(&mut n, circuit);
@@ -120,7 +120,8 @@ fn source(n: &mut String, p: &Parameters, i_in: f64) {
     }
 }
 
-fn leg(n: &mut String, p: &Parameters) {
+fn leg(n: &mut String, circuit: &Circuit<'_>) {
+    let p = circuit.parameters;
     let s = &p.switch;
     let diode = |n: &mut String, name: &str, from: &str, to: &str| {
         // the model has its own RS of 1e-4
@@ -135,6 +136,15 @@ fn leg(n: &mut String, p: &Parameters) {
     if p.converter.topology == Topology::Boost && p.source.c_in > 0.0 {
         // the inductor drives its current into this node, and ngspice finds no first step without a capacitance there
         let _ = writeln!(n, "Csw sw 0 10p");
+    }
+    if s.node_capacitance > 0.0 {
+        // at the side of the rectifier: what carries before the first edge
+        let v = if p.converter.topology == Topology::Boost {
+            circuit.v_out
+        } else {
+            0.0
+        };
+        let _ = writeln!(n, "Cnode sw 0 {:e} ic={v}", s.node_capacitance);
     }
     // the switch from its drain to its source, and the diode from anode to cathode
     let (main, rectifier) = match p.converter.topology {

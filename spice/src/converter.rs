@@ -20,7 +20,7 @@ const LONGEST_RUN: f64 = 1e6;
 
 /// The plant's effects that the netlist and the modulator here reproduce. One that is new there is refused until somebody
 /// writes its netlist: ngspice would otherwise answer for another converter.
-const KNOWN: [&str; 25] = [
+const KNOWN: [&str; 26] = [
     "converter",
     "dcr",
     "saturation",
@@ -32,6 +32,7 @@ const KNOWN: [&str; 25] = [
     "diode",
     "dead_time",
     "switch_delay",
+    "node_capacitance",
     "source_impedance",
     "input_ripple",
     "bleed",

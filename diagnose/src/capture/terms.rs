@@ -73,6 +73,7 @@ fn seen(plant: &Parameters, drive: &Drive) -> Parameters {
     if drive.applied {
         (p.pwm.duty_lsb, p.pwm.min_on_time) = (0.0, 0.0);
         (p.switch.dead_time, p.switch.turn_on_delay, p.switch.turn_off_delay) = (0.0, 0.0, 0.0);
+        p.switch.node_capacitance = 0.0;
     } else {
         p.switch.turn_off_delay += drive.trim.max(0.0) * p.t_sw();
         p.switch.turn_on_delay += (-drive.trim).max(0.0) * p.t_sw();

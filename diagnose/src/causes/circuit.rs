@@ -76,6 +76,20 @@ pub(super) const TURN_OFF_DELAY: Cause = Cause {
     )],
 };
 
+pub(super) const NODE_CAPACITANCE: Cause = Cause {
+    id: "node_capacitance",
+    kind: Kind::Part,
+    forms: &[form(
+        "capacitance at the switching node",
+        &[knob(
+            "node_capacitance",
+            &["switch.node_capacitance"],
+            // the usual current takes a fifth of the period to carry the node through the output's voltage; the step is that of `EDGE`
+            Reach::Capacitance(0.0, 0.2, 0.002),
+        )],
+    )],
+};
+
 pub(super) const ESR: Cause = Cause {
     id: "esr",
     kind: Kind::Part,

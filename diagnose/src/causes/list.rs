@@ -86,6 +86,7 @@ pub static CAUSES: &[Cause] = &[
     circuit::DEAD_TIME,
     circuit::TURN_ON_DELAY,
     circuit::TURN_OFF_DELAY,
+    circuit::NODE_CAPACITANCE,
     circuit::ESR,
     circuit::ESL,
     circuit::L_WRONG,

@@ -28,10 +28,11 @@ const TINY: f64 = 0.05;
 const SAME_PART: f64 = 0.005;
 
 /// Numbers of the plant that move the edges of the gate.
-const EDGES: [&str; 4] = [
+const EDGES: [&str; 5] = [
     "switch.dead_time",
     "switch.turn_on_delay",
     "switch.turn_off_delay",
+    "switch.node_capacitance",
     "pwm.duty_offset",
 ];
 

@@ -25,6 +25,7 @@ pub(crate) mod esr;
 pub(crate) mod input_ripple;
 pub(crate) mod load_setting;
 pub(crate) mod minimum_on_time;
+pub(crate) mod node_capacitance;
 pub(crate) mod saturation;
 pub(crate) mod sensor_delay;
 pub(crate) mod sensor_gain;
@@ -48,6 +49,7 @@ pub(crate) const ALL: &[&Effect] = &[
     &diode::EFFECT,
     &dead_time::EFFECT,
     &switch_delay::EFFECT,
+    &node_capacitance::EFFECT,
     &source_impedance::EFFECT,
     &input_ripple::EFFECT,
     &bleed::EFFECT,

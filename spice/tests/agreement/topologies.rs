@@ -79,7 +79,8 @@ fn of_the_buck(bench: &Bench, mut effect: Effect) -> Option<Case> {
         }
         effect.change = everything_but_esl;
     }
-    effect.bounds = [2e-3, 2e-3, effect.bounds[2]];
+    let [v, i, extremes] = effect.bounds;
+    effect.bounds = [v.max(2e-3), i.max(2e-3), extremes];
     let light = match tried.converter.rectifier {
         Rectifier::Synchronous => SMALL_CURRENTS,
         Rectifier::Diode => bench.light,

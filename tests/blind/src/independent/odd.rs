@@ -148,7 +148,7 @@ fn switching(id: &str, x: f64, design: &Design, board: &mut Board, random: &mut 
                 "{:.2e} F at the switch node: duty is gained at low current",
                 board.gates.node
             );
-            Some((what, &["turn_off_delay"]))
+            Some((what, &["node_capacitance", "turn_off_delay"]))
         }
         "recovery" => {
             board.gates.recovery = 0.02 * x * t;

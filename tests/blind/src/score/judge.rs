@@ -12,7 +12,7 @@ const KNOWABLE: f64 = 100.0;
 const WORTH: f64 = 0.3;
 /// Causes that a diagnosis may have added and that are right for an effect of nobody's list.
 const SAME: [(&str, &[&str]); 4] = [
-    ("slow_turn_off", &["turn_off_delay"]),
+    ("slow_turn_off", &["turn_off_delay", "node_capacitance"]),
     ("magnetic_hysteresis", &["core_loss"]),
     ("load_cable", &["cable"]),
     ("line_ripple", &["input_ripple"]),

@@ -127,6 +127,10 @@ fn beside_instants(
             (problem(), attribution)
         }
         _ => {
+            // what may stand in the place of one cause was fitted where the steps are as the table has them
+            if !is_alone && found.0.as_ref().is_some_and(|best| best.causes.len() == 1) {
+                free_singles = free.singles("load steps inside a period: each cause alone");
+            }
             let attribution = completed(&free, free_singles, found);
             drop(free);
             (inside.problem, attribution)

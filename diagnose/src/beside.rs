@@ -144,12 +144,16 @@ fn sentence(attribution: &Attribution, profile: &Profile, widened: &[Widened]) -
         format!("{} of {id}", profile.name)
     };
     let range = |ends: [f64; 2], of: &'static str| format!("{} to {}", si(ends[0], unit(of)), si(ends[1], unit(of)));
-    let with = widened.iter().map(|one| {
+    // forms of one cause may say the same
+    let mut with: Vec<String> = Vec::new();
+    for one in widened {
         let knob = &attribution.candidates[one.other].form.knobs[0];
         let (other, reach) = (attribution.id(one.other), range(one.reach, knob.unit()));
-        format!("{} with {other} beside it ({reach})", range(one.interval, profile.unit))
-    });
-    let with: Vec<String> = with.collect();
+        let said = format!("{} with {other} beside it ({reach})", range(one.interval, profile.unit));
+        if !with.contains(&said) {
+            with.push(said);
+        }
+    }
     Some(format!(
         "{name} from {} holds if nothing else is off; to first order these records also allow {}",
         range(profile.interval, profile.unit),

@@ -60,7 +60,11 @@ impl Inside {
                 .fitter
                 .from(&fit.causes, &fit.values, &inside.state),
         );
-        (!inside.ends_at_limits()).then_some(inside)
+        if inside.ends_at_limits() {
+            return None;
+        }
+        inside.leaders = inside.of_edges(search);
+        Some(inside)
     }
 
     fn of(search: &Searcher<'_>, problem: Problem, state: State) -> Self {
@@ -103,7 +107,16 @@ impl Inside {
         for (_, fit) in all.iter_mut().filter(|(_, fit)| fit.state.chi2 < NEAR_THE_BEST * least) {
             *fit = free.fitter.from(&fit.causes, &fit.values, &fit.state);
         }
+        all.extend(self.of_edges(search));
         all
+    }
+
+    /// The causes that move the edges of the gate, where these do more than edges can beside free instants as well: where the steps are as the table
+    /// has them it may not show.
+    fn of_edges(&self, search: &Searcher<'_>) -> Vec<(usize, Fit)> {
+        let begins = [&self.state, &self.null].into_iter();
+        let from = begins.min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        from.map_or_else(Vec::new, |from| self.searcher(search).of_edges(from))
     }
 
     /// Whether the instants leave nothing but noise, alone or beside one cause.

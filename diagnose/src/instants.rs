@@ -236,9 +236,12 @@ pub(crate) fn note(problem: &mut Problem, starts: &Starts) {
                 .collect();
             if !ended.is_empty() {
                 record.repairs.push(format!(
-                    "{} of these load steps end at the limit of one period, at t = {}: their rows may be wrong by a period and more. \
+                    "{} at the limit of one period, at t = {}: their rows may be wrong by a period and more. \
                      Is the column of the load shifted against the others?",
-                    ended.len(),
+                    match ended.len() {
+                        1 => "1 of these load steps ends".to_owned(),
+                        more => format!("{more} of these load steps end"),
+                    },
                     ended.join(", ")
                 ));
             }

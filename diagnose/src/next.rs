@@ -11,7 +11,7 @@ use crate::fit::State;
 use crate::played::{FOLDER, Played};
 use crate::problem::Problem;
 use crate::progress::{Listener, Progress};
-use crate::record::{CHANNELS, Record};
+use crate::record::{CHANNELS, QUANTITIES, Record};
 use crate::words::si;
 
 /// Rows of a planned experiment: 30 ms at 10 kHz, nine periods of the paper's filter, as long as the records of the blind cases.
@@ -327,6 +327,7 @@ fn planned(problem: &Problem, plan: Plan) -> Planned {
         phase,
         duty: (0..ROWS).map(|n| plan.duty.at(n).clamp(0.0, 1.0)).collect(),
         load: (0..ROWS).map(load).collect(),
+        headers: QUANTITIES.map(str::to_owned),
         measured: std::array::from_fn(|_| vec![f64::NAN; ROWS]),
         lattice: [0.0; CHANNELS],
         resolution: [0.0; CHANNELS],

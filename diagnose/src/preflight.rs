@@ -15,7 +15,7 @@ use crate::median::median;
 use crate::noise;
 use crate::parallel;
 use crate::problem::{Problem, duty_accuracy};
-use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
+use crate::record::{CHANNEL_NAMES, CHANNELS, QUANTITIES, Record};
 
 /// Farthest shift that is tried, rows.
 const FARTHEST: isize = 4;
@@ -120,8 +120,11 @@ impl Reading {
                 )
             }
             Reading::Exchanged(a, b) => {
-                let [a, b] = [a, b].map(|n| CHANNEL_NAMES[n]);
-                format!("{name}: the columns {a} and {b} look exchanged; if so: --map {a}={b},{b}={a}")
+                let [own, other] = [a, b].map(|n| &record.headers[n]);
+                format!(
+                    "{name}: the columns {own} and {other} look exchanged; if so: --map {}={other},{}={own}",
+                    QUANTITIES[a], QUANTITIES[b]
+                )
             }
             Reading::Probe(n, times) => {
                 let channel = CHANNEL_NAMES[n];
@@ -419,4 +422,30 @@ pub fn repeated<'a>(train: &'a [Record], held: &'a [Record]) -> Vec<(&'a str, &'
         Some((held.name.as_str(), known.name.as_str()))
     };
     held.iter().filter_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use measured::{ColumnMap, Sheet};
+    use plant::Parameters;
+
+    use super::Reading;
+    use crate::drive::Model;
+    use crate::record::Record;
+
+    #[test]
+    fn a_map_that_is_proposed_has_the_columns_of_the_file() {
+        let rows: String = (0..30)
+            .map(|n| format!("{:.4},0.5,{},5,20\n", n as f64 * 1e-4, 100 + n % 3))
+            .collect();
+        let text = format!("t,duty,Vout,I_load_meter,r_load\n{rows}");
+        let sheet = Sheet::parse(Path::new("run.csv"), text.into(), &Record::file_options()).unwrap();
+        let model = Parameters::paper_table();
+        let map = ColumnMap::parse("v_out=Vout,i_out=I_load_meter").unwrap();
+        let record = Record::read(&sheet, &map, &model).unwrap();
+        let said = Reading::Exchanged(0, 2).words(&record, &Model::new(&model));
+        assert!(said.ends_with("--map v_out=I_load_meter,i_out=Vout"), "{said}");
+    }
 }

@@ -46,6 +46,8 @@ pub struct Record {
     pub duty: Vec<f64>,
     /// Set load in the same period.
     pub load: Vec<Load>,
+    /// The columns of the channels, as the file calls them.
+    pub headers: [String; CHANNELS],
     /// Measured channels; NaN where nothing was measured.
     pub measured: [Vec<f64>; CHANNELS],
     /// Step on whose multiples all values of a channel lie, if that is coarser than the digits written; else 0.
@@ -129,6 +131,7 @@ impl Record {
             phase: lines.phase,
             duty: lines.duty,
             load: lines.load,
+            headers: QUANTITIES.map(|name| raw.source(name).header),
             measured: lines.measured,
             lattice: QUANTITIES.map(|name| raw.lattice(name)),
             resolution: QUANTITIES.map(|name| raw.resolution(name)),

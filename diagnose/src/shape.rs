@@ -238,9 +238,12 @@ fn kicks(record: &Record, values: &[f64], excess: f64) -> Option<String> {
     (most > 0 && held > OF_KICKS * excess && 2 * unstepped > found.len()).then(|| {
         let places: Vec<String> = found.iter().take(3).map(|row| format!("{:.5} s", record.time[*row])).collect();
         format!(
-            "kicks in {} places, first around t = {}, where neither duty nor load steps: something acts there that is in no column, be it lost or doubled \
+            "kicks in {}, first around t = {}, where neither duty nor load steps: something acts there that is in no column, be it lost or doubled \
              pulses, bursts from outside, or a load or a source that moves",
-            found.len(),
+            match found.len() {
+                1 => "1 place".to_owned(),
+                more => format!("{more} places"),
+            },
             places.join(", ")
         )
     })

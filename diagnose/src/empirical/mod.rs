@@ -161,9 +161,12 @@ impl Described {
         self.findings.written = refused.is_none();
         let [before, after] = self.findings.left_out_error;
         let what = format!(
-            "A correction of the duty with {} coefficients describes a part of what is left, and explains nothing: where its rows were left \
+            "A correction of the duty with {} describes a part of what is left, and explains nothing: where its rows were left \
              out of the fit the error falls from {before:.1} to {after:.1} times the noise.",
-            self.findings.coefficients.len()
+            match self.findings.coefficients.len() {
+                1 => "1 coefficient".to_owned(),
+                more => format!("{more} coefficients"),
+            }
         );
         let judged = match (&refused, self.findings.errors.iter().find(|worth| worth.heldout)) {
             (Some((ratio, place)), _) => format!(

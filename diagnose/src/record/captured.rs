@@ -81,6 +81,7 @@ impl Raw<'_> {
             phase: lines.phase,
             duty: lines.duty,
             load: lines.load,
+            headers: QUANTITIES.map(|name| self.source(name).header),
             measured: std::array::from_fn(|_| vec![f64::NAN]),
             lattice: [0.0; CHANNELS],
             resolution: [0.0; CHANNELS],

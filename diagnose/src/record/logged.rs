@@ -29,6 +29,8 @@ const RESTS: f64 = 7.0;
 /// Slowest decay that is waited for, as a share of the filter's angular frequency: real windings and capacitors
 /// damp at least as much (a loaded filter with a quality of 10). Only a model without losses has less.
 const LEAST_DAMPING: f64 = 0.05;
+/// Least share of the inductor's current that an output receives: beyond a duty of nine tenths no boost works.
+const LEAST_GIVEN: f64 = 0.1;
 /// Rows left out behind a step at least: a mean over the row of the step holds both sides, and a logger's own filter one more.
 const LEAST_LEFT_OUT: usize = 2;
 /// A change between rows is a step beyond this many times the usual one: five standard deviations of noise.
@@ -48,24 +50,27 @@ struct Stretch {
     load: Load,
 }
 
-/// Whether rows `periods` switching periods apart are those of a logger, for a converter of `parameters`.
-pub fn is_logged(periods: f64, parameters: &Parameters) -> bool {
-    let resolved = RESOLVED * std::f64::consts::TAU / (angular(parameters) * parameters.t_sw());
+/// Whether rows `periods` switching periods apart are those of a logger, for a converter of `parameters` at a duty.
+pub fn is_logged(periods: f64, parameters: &Parameters, duty: f64) -> bool {
+    let resolved = RESOLVED * std::f64::consts::TAU / (angular(parameters, duty) * parameters.t_sw());
     (1.5f64.max(resolved)..=MOST_PERIODS).contains(&periods)
 }
 
-fn angular(parameters: &Parameters) -> f64 {
+/// Angular frequency of the filter, rad/s: where the output gets a share of the inductor's current, by that share slower (Erickson and Maksimovic,
+/// table 8.2).
+fn angular(parameters: &Parameters, duty: f64) -> f64 {
     let converter = &parameters.converter;
-    1.0 / (converter.inductance * converter.capacitance).sqrt()
+    let give = converter.topology.give(duty).max(LEAST_GIVEN);
+    give / (converter.inductance * converter.capacitance).sqrt()
 }
 
 /// How long the filter needs until it rests under a load, s.
-fn settling(parameters: &Parameters, load: &Load, v: f64) -> f64 {
+fn settling(parameters: &Parameters, load: &Load, (v, duty): (f64, f64)) -> f64 {
     let p = parameters;
     let r = p.inductor.dcr + 0.5 * (p.switch.r_ds_on + p.switch.r_d);
     let g = load.conductance - load.power / (v * v).max(1e-12);
     let (omega, half) = (
-        angular(p),
+        angular(p, duty),
         0.5 * (g / p.converter.capacitance + r / p.converter.inductance),
     );
     let below = half * half - omega * omega * (1.0 + r * g);
@@ -89,7 +94,7 @@ impl Raw<'_> {
         let (mut points, mut used, mut settled) = (0, 0, 0);
         let (mut longest, mut least) = (0usize, f64::INFINITY);
         for stretch in &stretches {
-            let wait = settling(parameters, &stretch.load, v);
+            let wait = settling(parameters, &stretch.load, (v, stretch.duty));
             let out = ((wait / step).ceil() as usize).max(LEAST_LEFT_OUT);
             (longest, least) = (longest.max(stretch.rows.len()), least.min(out as f64 * step));
             let rows = (stretch.rows.start + out).min(stretch.rows.end)..stretch.rows.end;
@@ -240,5 +245,23 @@ impl Input {
         first
             .zip(last)
             .is_some_and(|(first, last)| (mean(last) - mean(first)).abs() <= self.still)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use plant::Parameters;
+
+    use super::is_logged;
+
+    /// 2 mH and 1.5 mF swing in 109 periods of 10 kHz as a buck; as a boost at a duty of three quarters in four times as many.
+    #[test]
+    fn a_boost_swings_slower_than_its_parts_by_the_share_that_its_output_gets() {
+        let mut p = Parameters::paper_model();
+        let is = |p: &Parameters, duty: f64| [12.0, 15.0, 50.0, 60.0].map(|periods| is_logged(periods, p, duty));
+        assert_eq!(is(&p, 0.75), [false, true, true, true]);
+        p.converter.topology = plant::Topology::Boost;
+        assert_eq!(is(&p, 0.75), [false, false, false, true]);
+        assert_eq!(is(&p, 0.0), [false, true, true, true]);
     }
 }

@@ -66,7 +66,7 @@ impl Raw<'_> {
         let phase = parameters.pwm.sampling_phase;
         let clock = Clock { step, t_sw, phase };
         // who says `settled = false` wants the rows simulated as they are
-        if map.settled != Some(false) && logged::is_logged(step / t_sw, parameters) {
+        if map.settled != Some(false) && logged::is_logged(step / t_sw, parameters, self.usual_duty()) {
             let time = self.values("t").unwrap_or_default();
             let stamped = self.stamped(&time, clock);
             let sampled = map.sampled.or(map.phase.map(|_| Sampled::Instant));
@@ -90,6 +90,12 @@ impl Raw<'_> {
             settled: false,
             ..lines
         })
+    }
+
+    /// The duty that the rows have in the middle; a half where none is read.
+    fn usual_duty(&self) -> f64 {
+        let duty = self.values("duty").unwrap_or_default();
+        super::suspicion::typical(&duty).unwrap_or(0.5)
     }
 
     /// Each row of the table as a settled point.
@@ -191,13 +197,18 @@ pub fn segments(rows: &[Option<usize>], duty: &[f64], load: &[Load]) -> Vec<Segm
     let mut steps: Vec<usize> = used.windows(2).map(|n| n[1] - n[0]).collect();
     steps.sort_unstable();
     let usual = steps.get(steps.len() / 2).copied().unwrap_or(1);
-    let steps = |pair: &[usize]| duty[pair[0]] != duty[pair[1]] || load[pair[0]] != load[pair[1]];
-    let stepped = used.windows(2).filter(|pair| steps(pair)).count();
-    let cut = usual > 1 && (stepped as f64) < RARE * used.len() as f64;
+    let of_duty = |pair: &[usize]| duty[pair[0]] != duty[pair[1]];
+    let of_load = |pair: &[usize]| load[pair[0]] != load[pair[1]];
+    // beside a controller that moves the duty at each row a load may be stepped all the same
+    let [cuts_duty, cuts_load] = [&of_duty as &dyn Fn(&[usize]) -> bool, &of_load].map(|steps| {
+        let stepped = used.windows(2).filter(|pair| steps(pair)).count();
+        usual > 1 && (stepped as f64) < RARE * used.len() as f64
+    });
+    let cut = |pair: &[usize]| cuts_duty && of_duty(pair) || cuts_load && of_load(pair);
     let mut segments = Vec::new();
     let mut start = used.first().copied().unwrap_or(0);
     for pair in used.windows(2) {
-        if pair[1] - pair[0] > usual || cut && steps(pair) {
+        if pair[1] - pair[0] > usual || cut(pair) {
             segments.push(start..pair[0] + 1);
             start = pair[1];
         }

@@ -48,6 +48,22 @@ fn a_gap_makes_a_new_segment() {
     assert_eq!(record.segments, [0..10, 14..30]);
 }
 
+/// Rows two periods apart, of which a controller gives each a duty of its own; the load steps behind the twentieth.
+#[test]
+fn a_load_step_between_rows_begins_a_new_stretch_beside_a_controller_too() {
+    let mut text = String::from("t,d,v_o,r_load\n");
+    for n in 0..40 {
+        let (duty, load) = (0.5 + 1e-3 * (n % 9) as f64, if n < 20 { 20 } else { 15 });
+        let _ = writeln!(text, "{:.6},{duty},{:.3},{load}", (2 * n) as f64 * 1e-4, 200.0 * duty);
+    }
+    let record = read(&text).unwrap();
+    // rows between hold what was not recorded
+    assert_eq!(record.segments, [0..39, 40..79]);
+    // and without a step there is nothing to cut
+    let record = read(&text.replace(",15\n", ",20\n")).unwrap();
+    assert_eq!(record.segments.len(), 1);
+}
+
 #[test]
 fn backward_time_a_percent_duty_and_another_rate_are_faults_with_a_place() {
     let swapped = rows(|n, line| if n == 8 { "0.0001,0.5,100,20".to_owned() } else { line });

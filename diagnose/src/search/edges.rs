@@ -4,6 +4,9 @@ use super::{Searcher, Set};
 use crate::fit::{Fit, State};
 use crate::parallel;
 
+/// Causes beside which one that moves the edges is still sought: with it they are as many as a search names.
+const MOST_BESIDE_EDGES: usize = 3;
+
 impl Searcher<'_> {
     /// Whether a fit says what the edges of the gate do, where without it they would do more than edges can: the trim that stands beside
     /// every fit takes a dead time as its own, at a price so small that the dead time would gain too little.
@@ -35,6 +38,31 @@ impl Searcher<'_> {
         parallel::map(&edges, |cause| self.added(&set, *cause, &best.state))
     }
 
+    /// A set beside which the edges still do more than edges can, with the cause that does it in their place, if one does. It is sought when nothing
+    /// else is any more, budget or not: else what was found is no explanation for want of it.
+    pub(super) fn without_edges(&self, best: Fit) -> Fit {
+        if best.causes.len() >= MOST_BESIDE_EDGES || self.structure(&best) > 0.0 {
+            return best;
+        }
+        let fits = self.with_edges(&best).into_iter();
+        let found = fits
+            .filter(|fit| self.stands_for_edges(&best.state, fit))
+            .min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+        found.map_or(best, |fit| self.polished(&fit))
+    }
+
+    /// Where the edges do more than edges can: each cause that moves them alone, in their place, with its place among the candidates.
+    pub(crate) fn of_edges(&self, from: &State) -> Vec<(usize, Fit)> {
+        if !self.asks_for_edges(from) {
+            return Vec::new();
+        }
+        let all = 0..self.fitter.candidates.len();
+        let edges: Vec<usize> = all
+            .filter(|cause| self.fitter.candidates[*cause].is_of_edges())
+            .collect();
+        parallel::map(&edges, |cause| (*cause, self.added(&Set::NONE, *cause, from)))
+    }
+
     /// Where the edges do more than edges can: a cause that moves them in their place, its values and the state without what they did. Beside
     /// a trim the tangent of such a cause is all but its own, and what the two differ by is their curvature: a fit from the model's own
     /// value finds no way.
@@ -49,12 +77,13 @@ impl Searcher<'_> {
         let mut without = from.clone();
         let duty = std::mem::take(&mut without.starts.trim);
         // which way a late edge moves the duty depends on the leg and on the sign of its current
-        let by = match candidate.form.knobs[0].unit() == "s" {
-            true => vec![
-                duty * self.fitter.problem.bases.t_sw,
-                -duty * self.fitter.problem.bases.t_sw,
-            ],
-            false => vec![duty],
+        let bases = &self.fitter.problem.bases;
+        let topology = self.fitter.problem.base.plant.converter.topology;
+        let by = match candidate.form.knobs[0].unit() {
+            "s" => vec![duty * bases.t_sw, -duty * bases.t_sw],
+            // half of a ramp is on-time won
+            "F" => vec![2.0 * duty * bases.t_sw * bases.i / topology.span(bases.v_in, bases.v)],
+            _ => vec![duty],
         };
         let values = by.into_iter().map(|by| own + by);
         let inside = values.filter(|value| (*low..=*high).contains(value));

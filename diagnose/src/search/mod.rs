@@ -238,6 +238,7 @@ impl Searcher<'_> {
             self.fitter.problem.work.leaves(self.share_left(&best));
             leaders = larger;
         }
+        best = self.without_edges(best);
         if !self.is_hopeless(&best, before) {
             best = self.reformed(best);
         }
@@ -268,7 +269,7 @@ impl Searcher<'_> {
     }
 
     /// The fit brought to its end.
-    fn polished(&self, fit: &Fit) -> Fit {
+    pub(super) fn polished(&self, fit: &Fit) -> Fit {
         let fitter = Fitter {
             effort: FINE,
             ..self.fitter

@@ -38,6 +38,16 @@ fn ids(findings: &Findings) -> Vec<&'static str> {
     findings.causes.iter().map(|cause| cause.id).collect()
 }
 
+/// The value of `id` in the tie of the only cause, as the cause itself or as a rival.
+fn in_tie(findings: &Findings, id: &str) -> Option<f64> {
+    let [cause] = &findings.causes[..] else {
+        panic!("{}", findings.sentence)
+    };
+    let own = cause.parameters.values().map(|value| (cause.id, value.value));
+    let tied = cause.rival_values.iter().flatten().map(|value| (value.id, value.value));
+    own.chain(tied).find(|(known, _)| *known == id).map(|(_, value)| value)
+}
+
 /// The diode drops 1.405 V in the place of 0.52 V, and nothing else is hidden.
 #[test]
 fn a_second_cause_that_the_held_out_record_refutes_is_not_named() {
@@ -58,14 +68,9 @@ fn a_second_cause_that_the_held_out_record_refutes_is_not_named() {
 fn a_cause_that_is_nothing_beside_its_rival_is_something_in_its_place() {
     let findings = findings("tied", &[]);
     assert_eq!(findings.verdict, Verdict::Ambiguous, "{}", findings.sentence);
-    let [cause] = &findings.causes[..] else {
-        panic!("{}", findings.sentence)
-    };
-    let own = cause.parameters.values().map(|value| (cause.id, value.value));
-    let tied = cause.rival_values.iter().flatten().map(|value| (value.id, value.value));
-    let offset = own.chain(tied).find(|(id, _)| *id == "v_offset");
+    let offset = in_tie(&findings, "v_offset");
     assert!(
-        offset.is_some_and(|(_, value)| (value - 0.443).abs() < 0.01),
+        offset.is_some_and(|value| (value - 0.443).abs() < 0.01),
         "{}",
         findings.sentence
     );
@@ -129,14 +134,9 @@ fn a_cause_that_moves_the_edges_is_found_where_the_trim_has_taken_its_place() {
 fn a_tie_beside_load_steps_inside_periods_has_every_member() {
     let findings = findings("instants", &[]);
     assert_eq!(findings.verdict, Verdict::Ambiguous, "{}", findings.sentence);
-    let [cause] = &findings.causes[..] else {
-        panic!("{}", findings.sentence)
-    };
-    let own = cause.parameters.values().map(|value| (cause.id, value.value));
-    let tied = cause.rival_values.iter().flatten().map(|value| (value.id, value.value));
-    let switch = own.chain(tied).find(|(id, _)| *id == "r_ds_on");
+    let switch = in_tie(&findings, "r_ds_on");
     assert!(
-        switch.is_some_and(|(_, value)| (value / 0.06976 - 1.0).abs() < 0.03),
+        switch.is_some_and(|value| (value / 0.06976 - 1.0).abs() < 0.03),
         "{}",
         findings.sentence
     );

@@ -138,6 +138,9 @@ pub fn explained_without(
     if whole.verdict != Verdict::Unexplained || whole.is_misread() || records.iter().any(is_short) {
         return None;
     }
+    if !whole.problem.work.may_begin_again() {
+        return None;
+    }
     let attribution = &whole.attribution;
     let looks = match whole.structure.is_empty() {
         false => parts(whole, attribution.state(), &whole.structure),

@@ -5,6 +5,7 @@ use crate::basis::Basis;
 use crate::causes::{Candidate, Search, candidates};
 use crate::coloured;
 use crate::fit::{FINE, Fit, Fitter, ROUGH, State};
+use crate::in_front;
 use crate::inside::Inside;
 use crate::instants;
 use crate::level::threshold;
@@ -53,8 +54,12 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
     }
     let candidates = sought(&problem);
     let basis = problem.basis(&null.model, &null.starts, &null.residual);
+    let begun_at = problem.work.rows();
+    let singles = searcher(&problem, &candidates, &basis, &null, say).singles("each cause alone");
+    problem.work.singles_are_done(begun_at);
+    let read = in_front::read(&problem, &null, &candidates, &singles, say);
+    let (problem, null, singles) = read.unwrap_or((problem, null, singles));
     let search = searcher(&problem, &candidates, &basis, &null, say);
-    let singles = search.singles("each cause alone");
     let Some(inside) = Inside::needed(&search, &singles) else {
         let found = search.grow(&singles);
         let attribution = completed(&search, singles, found);
@@ -268,7 +273,10 @@ impl Attribution {
             let candidate = &self.candidates[best.causes[*member]];
             let values: Vec<f64> = own(*member).map(|profile| profile.value).collect();
             let sizes = candidate.sizes();
-            candidate.is_nothing(&values) || sizes > 0 && own(*member).take(sizes).all(Profile::holds_own)
+            let evidence = self.evidence.get(*member).copied().unwrap_or(0.0);
+            // of two numbers each may be nothing beside the other, and both not
+            let is_held = sizes > 1 && evidence >= threshold(values.len(), self.inflation);
+            candidate.is_nothing(&values) || sizes > 0 && !is_held && own(*member).take(sizes).all(Profile::holds_own)
         };
         let out: Vec<usize> = (0..best.causes.len()).filter(is_nothing).collect();
         self.leave_out(problem, profiles, &out)

@@ -186,10 +186,13 @@ fn reach(problem: &Problem, channel: usize) -> f64 {
 /// Causes of one explanation from which on some have to be held by the records alone.
 const MANY: usize = 3;
 
-/// Several causes of which each could be another fit whatever bends a record: one channel is given by many pairs, and anything by threes.
+/// Several causes of which each could be another fit whatever bends a record: one channel is given by many pairs, and anything by threes. Something less
+/// usual that would do as well, or a part of a cause, speaks for no other.
 fn loose(problem: &Problem, attribution: &Attribution) -> Option<Doubt> {
-    let tied = attribution.rivals.iter().filter(|rivals| !rivals.is_empty()).count();
     let causes = attribution.best.as_ref().map_or(0, |best| best.causes.len());
+    let tied = (0..causes)
+        .filter(|member| attribution.could_be_another(*member))
+        .count();
     let in_time = problem
         .records
         .iter()

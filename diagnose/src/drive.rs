@@ -13,7 +13,7 @@ use std::sync::Arc;
 use measured::{DutyIs, Sampled};
 use plant::{Carrier, Load, Parameters, Plant, Rectifier, Signals};
 
-use crate::record::{CHANNELS, Record, Segment};
+use crate::record::{CHANNELS, Record, Segment, V_IN};
 use crate::resistors::{self, Resistor};
 
 /// Duties before a segment that the plant is given at least: more than it can delay. A rate looks back farther.
@@ -62,6 +62,8 @@ pub struct Model {
     pub certain: Arc<[String]>,
     /// The resistors of the load, where the records have several.
     pub resistors: Vec<Resistor>,
+    /// `v_in` is measured in front of what the source has, and not at the converter's input.
+    pub v_in_in_front: bool,
 }
 
 impl Model {
@@ -73,6 +75,7 @@ impl Model {
             late: 0.0,
             resistors: Vec::new(),
             certain: Arc::default(),
+            v_in_in_front: false,
         }
     }
 
@@ -189,8 +192,20 @@ pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>
             false => ran.periods += driver.run(&mut plant, segment, start, &mut shown),
         }
         ran.steps += plant.steps_taken();
+        if model.v_in_in_front {
+            show_source(&p, segment, phase, &mut shown);
+        }
     }
     (shown, ran)
+}
+
+/// Shows the source's own voltage, which stands still but for a ripple that no filter of a sensor keeps off, in the place of the converter's input.
+fn show_source(p: &Parameters, segment: &Segment, phase: f64, shown: &mut [[f64; CHANNELS]]) {
+    let sensor = &p.sensors.v_in;
+    for (n, row) in shown[segment.start..segment.end].iter_mut().enumerate() {
+        let since = (n as f64 + phase) * p.t_sw();
+        row[V_IN] = sensor.gain * p.source_voltage(since) + sensor.offset;
+    }
 }
 
 /// Whole periods by which the samples of a record are late, and the phase of the period in which they lie, when they are taken `late` periods later

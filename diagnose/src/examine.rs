@@ -6,6 +6,7 @@ use crate::drive::Model;
 use crate::fast;
 use crate::findings::{Evidence, Named, Value, Verdict};
 use crate::fit::State;
+use crate::in_front;
 use crate::instants;
 use crate::noise::{self, Outlier};
 use crate::preflight::{self, Misread};
@@ -77,6 +78,9 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
         None => {}
     }
     let (mut problem, mut attribution) = attribute(problem, null, say);
+    if problem.base.v_in_in_front && !base.v_in_in_front {
+        odd.push(in_front::SAID.to_owned());
+    }
     let is_line = |state| !fast::structures(&problem, &attribution.null, state).is_empty();
     let beside_line = is_line(&attribution.null) || is_line(attribution.state());
     odd.extend((attribution.leave_out_coloured(&problem, beside_line)).into_iter().map(|id| {
@@ -280,11 +284,12 @@ fn held_by_data(
     for rivals in attribution.rivals.iter_mut().take(1) {
         rivals.extend(others.iter().cloned());
     }
-    rivals::most_usual_first(problem, attribution);
+    rivals::most_usual_first(problem, attribution, say);
     for (member, rival) in crate::ties::in_part(problem, attribution, say) {
         attribution.rivals[member].push(rival);
     }
     rivals::leave_out_cut_off(attribution);
+    rivals::sort_by_use(attribution);
     intervals(problem, attribution, structure, say)
 }
 

@@ -21,7 +21,7 @@ use crate::work::Work;
 /// decides a tie (9).
 const SMALL_GAIN: f64 = 0.02;
 
-/// A fit that leaves more than this mean square is looked at again with the initial states that it has by now, ...
+/// A fit that leaves more than this mean square in a record is looked at again with the initial states that it has by now, ...
 // what leaves less has no structure left (`shape`), and most fits need no second look
 const STILL_OFF: f64 = 1.5;
 /// ... if these gain a twentieth: less is no frequency that has run away.
@@ -229,8 +229,7 @@ impl Fitter<'_> {
     pub fn holding(&self, causes: &[usize], values: &[f64], from: &State, held: Option<usize>) -> Fit {
         let mut rows = 0;
         let fit = self.in_basis(causes, values, from, held, &mut rows);
-        let count = self.problem.count() as f64;
-        if fit.state.chi2 < STILL_OFF * count {
+        if !self.problem.leaves_more(&fit.state.residual, STILL_OFF) {
             return fit;
         }
         // initial states ring as the filter does: where the fit has moved its frequency, what they explain is something else by now
@@ -243,9 +242,13 @@ impl Fitter<'_> {
         } = &fit.state;
         let own = self.problem.basis(model, starts, residual);
         let settle = |starts: &Starts| State::settle_in(self.problem, model, starts, Some(&own), 2);
-        // those of the model as given may be too far off for a step from there: the records' own beginnings are another place
-        let [settled, afresh] = [settle(starts), settle(&self.problem.first_starts(model))];
-        let settled = if afresh.chi2 < settled.chi2 { afresh } else { settled };
+        // those of the model as given may be too far off for a step from there, or where the current rests and nothing shows the way: the records' own
+        // beginnings are another place
+        let begun = Starts {
+            states: self.problem.first_starts(model).states,
+            ..starts.clone()
+        };
+        let settled = self.problem.nearer_of_each(settle(starts), &settle(&begun));
         if settled.chi2 > RUN_AWAY * chi2 {
             return fit;
         }

@@ -94,24 +94,23 @@ impl Examined {
     /// the causes were sought in do not put the members in order, so that the one that does not hold stays in the tie.
     fn led_by_what_holds(&mut self, heldout: &[Record], base: &Model) -> Option<Pair> {
         let attribution = &self.attribution;
-        let holding = |(member, rival): (usize, &Fit)| {
+        let holding = |(member, other, rival): (usize, usize, &Fit)| {
             let state = &rival.state;
             let leaves = structures(&self.problem, &attribution.null, state, attribution.inflation);
             let trim = state.starts.trim_or_none(base.plant.converter.f_sw);
             let pair = held(&self.problem, heldout, base, state, trim)?;
             let holds =
                 leaves.is_empty() && against(&pair, &self.problem, state, &Of::fit(attribution, rival)).is_empty();
-            holds.then(|| (member, rival.clone(), pair))
+            holds.then(|| (member, other, rival.clone(), pair))
         };
         let held = rivals::in_one_place(attribution).filter_map(holding);
-        let (member, leader, pair) = held.min_by(|a, b| a.2.total().1.total_cmp(&b.2.total().1))?;
-        let [before, after] =
-            [attribution.best.as_ref()?.causes[member], *leader.causes.last()?].map(|cause| attribution.id(cause));
+        let (member, other, leader, pair) = held.min_by(|a, b| a.3.total().1.total_cmp(&b.3.total().1))?;
+        let [before, after] = [attribution.best.as_ref()?.causes[member], other].map(|cause| attribution.id(cause));
         let words = format!(
             "{before} and {after} explain the training records as well as each other, and in the held-out ones {after} holds and {before} does \
              not: another record has to judge it"
         );
-        self.attribution.lead(member, leader, false);
+        self.attribution.lead(leader, false);
         self.answer();
         self.odd.push(words);
         Some(pair)

@@ -44,6 +44,7 @@ pub mod gain;
 mod held_out;
 mod held_table;
 pub mod ideal;
+mod in_front;
 mod inside;
 mod instants;
 mod judge;

@@ -8,6 +8,7 @@ use crate::doubts;
 use crate::fit::Fit;
 use crate::problem::Problem;
 use crate::profile::Profile;
+use crate::progress::{self, Listener};
 use crate::shape::structures;
 
 /// 95 % of a chi-square of one degree of freedom: within it the data do not say which of two is better.
@@ -62,34 +63,40 @@ fn interval(attribution: &Attribution, fit: &Fit, number: usize, [low, high, _]:
     [-TWO_SIDED, TWO_SIDED].map(|side| (fit.values[number] + side * variance.sqrt()).clamp(low, high))
 }
 
-/// Among members of a tie that the data cannot put in order the more usual one leads: copper and diode before the gain of a probe.
-/// What it replaces becomes its rival. A member that ends at the limit of what is tried leads nothing that another explains as well:
-/// it is no explanation, and no rival either.
-pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution) {
-    let members = attribution.best.as_ref().map_or(0, |best| best.causes.len());
-    for member in 0..members {
-        let Some(best) = &attribution.best else { return };
-        let own = attribution.usual(best, best.causes[member]);
-        // a rival lies within a tie, whatever a member gains that may not go on
-        let worst = match own.is_at_bound {
-            true => f64::INFINITY,
-            false => best.state.chi2 + LEVEL * attribution.inflation,
-        };
-        let leads = |fit: &&Fit| {
-            // the rival of one cause stands last, behind those that are kept
-            let other = fit.causes.last().map(|cause| attribution.usual(fit, *cause));
-            stands_for(fit, best, member)
-                && other.is_some_and(|other| other < own)
-                && fit.state.chi2 <= worst
-                && structures(problem, &attribution.null, &fit.state, attribution.inflation).is_empty()
-        };
-        let found = attribution.rivals[member].iter().filter(leads);
-        let Some(leader) = found.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2)).cloned() else {
-            continue;
-        };
-        attribution.lead(member, leader, own.is_at_bound);
-        // the others have moved a place
-        return most_usual_first(problem, attribution);
+/// Among explanations of as many causes that the data cannot put in order the most usual one leads, of these the one with the fewest numbers:
+/// copper and diode before the gain of a probe and a counter of few counts. What it replaces becomes its rival. One that ends at the limit of what is tried leads nothing that another explains
+/// as well: it is no explanation, and no rival either.
+pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution, say: Listener<'_>) {
+    let Some(best) = &attribution.best else { return };
+    let own = attribution.least_usual_first(best);
+    let is_out = |of: &[Usual]| of.first().is_some_and(|least| least.is_at_bound);
+    // a rival lies within a tie, whatever one gains that may not go on
+    let worst = match is_out(&own) {
+        true => f64::INFINITY,
+        false => best.state.chi2 + LEVEL * attribution.inflation,
+    };
+    let leads = |(fit, usual): &(&Fit, Vec<Usual>)| {
+        fit.causes.len() == best.causes.len()
+            && *usual < own
+            && fit.state.chi2 <= worst
+            && structures(problem, &attribution.null, &fit.state, attribution.inflation).is_empty()
+    };
+    let all = attribution.rivals.iter().flatten();
+    let found = all.map(|fit| (fit, attribution.least_usual_first(fit))).filter(leads);
+    let order = |a: &(&Fit, Vec<Usual>), b: &(&Fit, Vec<Usual>)| {
+        let numbers = a.0.values.len().cmp(&b.0.values.len());
+        (a.1.cmp(&b.1).then(numbers)).then(a.0.state.chi2.total_cmp(&b.0.state.chi2))
+    };
+    let Some((leader, usual)) = found.min_by(order).map(|(fit, usual)| (fit.clone(), usual)) else {
+        return;
+    };
+    let is_out = is_out(&own) && !is_out(&usual);
+    let shared = |fit: &Fit| leader.causes.iter().filter(|cause| fit.causes.contains(cause)).count();
+    let is_of_one = shared(best) + 1 == leader.causes.len();
+    attribution.lead(leader, is_out);
+    if !is_of_one {
+        // nothing of the evidence was for these
+        attribution.weigh_again(problem, say);
     }
 }
 
@@ -98,7 +105,7 @@ pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution) {
 const UNTYPICAL: f64 = 5.0;
 
 /// How usual a cause with its values is, the most usual first.
-#[derive(PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Usual {
     is_at_bound: bool,
     is_untypical: bool,
@@ -131,38 +138,98 @@ impl Attribution {
         }
     }
 
-    /// Puts `leader`, a rival of `member`, in the place of the best, which becomes a rival unless it `is_out`; its new cause stands
-    /// last.
-    pub(crate) fn lead(&mut self, member: usize, leader: Fit, is_out: bool) {
+    /// How usual the causes of a set are, the least usual first: an explanation is as usual as that.
+    fn least_usual_first(&self, fit: &Fit) -> Vec<Usual> {
+        let mut list: Vec<Usual> = fit.causes.iter().map(|cause| self.usual(fit, *cause)).collect();
+        list.sort_by(|a, b| b.cmp(a));
+        list
+    }
+
+    /// Whether something that is as usual could stand in the place of the whole of a cause.
+    pub(crate) fn could_be_another(&self, member: usize) -> bool {
+        let Some(best) = &self.best else { return false };
+        let own = self.usual(best, best.causes[member]);
+        let is_new = |cause: &&usize| best.causes.iter().all(|known| !self.same(*known, **cause));
+        self.rivals[member].iter().any(|fit| {
+            let is_whole = fit.causes.iter().all(|cause| !self.same(*cause, best.causes[member]));
+            let mut new = fit.causes.iter().filter(is_new);
+            is_whole && new.all(|cause| self.usual(fit, *cause) <= own)
+        })
+    }
+
+    /// Puts `leader`, one of the rivals, in the place of the best, which becomes a rival unless it `is_out`. Each rival stands at the first cause
+    /// that it has not.
+    pub(crate) fn lead(&mut self, leader: Fit, is_out: bool) {
         let Some(best) = self.best.take() else { return };
-        let same = |fit: &Fit| fit.causes == leader.causes;
-        let mut rivals = without(&self.rivals, member);
-        let others = self.rivals[member].iter().filter(|fit| !same(fit)).cloned();
-        let before = (!is_out).then(|| best.clone());
-        rivals.push(before.into_iter().chain(others).collect());
-        let mut evidence = without(&self.evidence, member);
-        evidence.push(self.evidence[member] - (leader.state.chi2 - best.state.chi2));
-        (self.rivals, self.evidence, self.best) = (rivals, evidence, Some(leader));
+        let more = leader.state.chi2 - best.state.chi2;
+        let place = |cause: &usize| best.causes.iter().position(|known| known == cause);
+        let old: Vec<Option<usize>> = leader.causes.iter().map(place).collect();
+        let replaced = (0..best.causes.len()).find(|member| !leader.causes.contains(&best.causes[*member]));
+        let of_replaced = replaced.map_or(0.0, |member| self.evidence[member]) - more;
+        self.evidence = (old
+            .iter()
+            .map(|place| place.map_or(of_replaced, |place| self.evidence[place])))
+        .collect();
+        let mut rivals = vec![Vec::new(); leader.causes.len()];
+        let before = (!is_out).then_some((usize::MAX, best));
+        let others = std::mem::take(&mut self.rivals).into_iter().enumerate();
+        let others = others.flat_map(|(member, fits)| fits.into_iter().map(move |fit| (member, fit)));
+        for (member, fit) in before.into_iter().chain(others) {
+            let lacks = |cause: &usize| fit.causes.iter().all(|own| !self.same(*own, *cause));
+            // what has all of them and more stands beside one of them, if it is still there
+            let own = leader.causes.iter().position(lacks);
+            let Some(place) = own.or_else(|| old.iter().position(|place| *place == Some(member))) else {
+                continue;
+            };
+            if fit.causes.len() != leader.causes.len() || own.is_some() {
+                rivals[place].push(fit);
+            }
+        }
+        (self.rivals, self.best) = (rivals, Some(leader));
+    }
+
+    /// The evidence of each cause: chi-square lost without it.
+    fn weigh_again(&mut self, problem: &Problem, say: Listener<'_>) {
+        let Some(best) = &self.best else { return };
+        let members: Vec<usize> = (0..best.causes.len()).collect();
+        let lost = progress::map(say, "evidence", &members, |member| {
+            let kept = without(&best.causes, *member);
+            let own = kept.iter().flat_map(|cause| self.candidates[*cause].own.clone());
+            let fit = self.fitter(problem).from(&kept, &own.collect::<Vec<f64>>(), &self.null);
+            fit.state.chi2 - best.state.chi2
+        });
+        self.evidence = lost;
     }
 }
 
-/// Rivals that stand in the place of one cause, beside the others, with that place.
-pub(crate) fn in_one_place(attribution: &Attribution) -> impl Iterator<Item = (usize, &Fit)> {
+/// Rivals that stand in the place of one cause, beside the others, with that place and the cause that stands there.
+pub(crate) fn in_one_place(attribution: &Attribution) -> impl Iterator<Item = (usize, usize, &Fit)> {
     let rivals = attribution.rivals.iter().enumerate();
     let each = rivals.flat_map(|(member, fits)| fits.iter().map(move |fit| (member, fit)));
-    each.filter(|(member, fit)| (attribution.best.as_ref()).is_some_and(|best| stands_for(fit, best, *member)))
-}
-
-/// Whether a rival has all of the best's causes but one, and its own last.
-fn stands_for(rival: &Fit, best: &Fit, member: usize) -> bool {
-    let kept = without(&best.causes, member);
-    rival.causes.len() == kept.len() + 1 && rival.causes.starts_with(&kept)
+    each.filter_map(|(member, fit)| {
+        let kept = without(&attribution.best.as_ref()?.causes, member);
+        let is_kept = kept.iter().all(|cause| fit.causes.contains(cause));
+        let other = fit.causes.iter().find(|cause| !kept.contains(cause));
+        (is_kept && fit.causes.len() == kept.len() + 1).then_some((member, *other?, fit))
+    })
 }
 
 fn without<T: Clone>(list: &[T], member: usize) -> Vec<T> {
     let mut kept = list.to_vec();
     kept.remove(member);
     kept
+}
+
+/// Sorts what could stand in each place, the most usual first: a reader is told the first of a list.
+pub fn sort_by_use(attribution: &mut Attribution) {
+    let mut rivals = std::mem::take(&mut attribution.rivals);
+    for list in &mut rivals {
+        list.sort_by_cached_key(|fit| {
+            let numbers = fit.values.len();
+            (fit.causes.len(), attribution.least_usual_first(fit), numbers)
+        });
+    }
+    attribution.rivals = rivals;
 }
 
 /// Takes out what ends where it is cut off: a steep fall of the inductance below every current is another inductance, and no explanation of

@@ -191,16 +191,14 @@ fn tie(cause: &Named, causes: &[Named]) -> String {
     let is_beside = |ids: &&Vec<&str>| ids.contains(&cause.id) && ids.iter().any(|id| is_other(&id));
     let rivals = cause.rivals.iter().zip(&cause.rival_values);
     let (inside, whole): (Vec<_>, Vec<_>) = rivals.partition(|(ids, _)| is_beside(ids));
-    let mut sentences = Vec::new();
-    let rivals: Vec<String> = whole.into_iter().map(|(_, values)| needs(values)).collect();
-    if !rivals.is_empty() {
-        let more = match rivals.len().saturating_sub(MOST_SAID) {
-            0 => String::new(),
-            more => format!(", or {more} others"),
-        };
-        let said = rivals[..rivals.len().min(MOST_SAID)].join(", or ");
-        sentences.push(format!("In place of {} it could be {said}{more}.", cause.id));
-    }
+    let has_none = |ids: &Vec<&str>| causes.len() > 1 && causes.iter().all(|own| !ids.contains(&own.id));
+    let (others, own): (Vec<_>, Vec<_>) = whole.into_iter().partition(|(ids, _)| has_none(ids));
+    let all = if causes.len() == 2 { "both" } else { "all of them" };
+    let mut sentences: Vec<String> = [(cause.id, own), (all, others)]
+        .iter()
+        .filter(|(_, rivals)| !rivals.is_empty())
+        .map(|(place, rivals)| in_place_of(place, rivals.iter().map(|(_, values)| needs(values))))
+        .collect();
     let extra: Vec<&str> = inside
         .iter()
         .flat_map(|(ids, _)| ids.iter().filter(is_other))
@@ -210,6 +208,18 @@ fn tie(cause: &Named, causes: &[Named]) -> String {
         sentences.push(format!("A part of {} could be {}.", cause.id, extra.join(" or ")));
     }
     sentences.join(" ")
+}
+
+/// What could stand in a place, as much as a reader remembers.
+fn in_place_of(place: &str, rivals: impl Iterator<Item = String>) -> String {
+    let rivals: Vec<String> = rivals.collect();
+    let more = match rivals.len().saturating_sub(MOST_SAID) {
+        0 => String::new(),
+        1 => ", or one other".to_owned(),
+        more => format!(", or {more} others"),
+    };
+    let said = rivals[..rivals.len().min(MOST_SAID)].join(", or ");
+    format!("In place of {place} it could be {said}{more}.")
 }
 
 /// A rival with the values that it needs: `dcr 150.2 mohm + diode (v_f 1.1 V, r_d 20 mohm)`.

@@ -22,6 +22,12 @@ const ROWS_OF_PART: u64 = 20_000_000;
 /// A search in a part may compute as much as this whatever was computed before: where one channel is disturbed, the causes bend to it and come near,
 /// and are none.
 const LEAST_OF_PART: u64 = 7_000_000;
+/// Rows within which a whole search without a part has to begin and to have looked at every cause alone once more.
+// of 1,440 rows, three periods each, it took 32 million behind 59, in vain; at 45 million a diode beside a channel set aside is missed, at 55 it is found
+const ROWS_OF_ALL: u64 = 55_000_000;
+/// Rows in which terms of an empirical correction are sought; the one that is begun is brought to its end.
+// a term takes 2 million in records of a thousand rows, and there are at most seven
+const ROWS_OF_TERMS: u64 = 20_000_000;
 /// Steps of the integrator that take as long as a row of a plain converter.
 // a quarter of a microsecond each, on the core that does a million rows
 const STEPS: u64 = 4;
@@ -74,6 +80,8 @@ impl Default for Work {
 #[derive(Debug, Default)]
 struct Counts {
     rows: AtomicU64,
+    /// What all causes alone took, the first time.
+    singles: AtomicU64,
     /// The limit at which something was not begun; 0 if everything was.
     cut_at: AtomicU64,
 }
@@ -90,7 +98,7 @@ impl Work {
 
     /// The same budget for a search in a part of the records.
     pub(crate) fn of_part(&self) -> Self {
-        let least = self.all.rows.load(Ordering::Relaxed).saturating_add(LEAST_OF_PART);
+        let least = self.rows().saturating_add(LEAST_OF_PART);
         Work {
             all: Arc::clone(&self.all),
             is_near: Arc::default(),
@@ -141,6 +149,28 @@ impl Work {
         }
     }
 
+    /// Every cause has been looked at alone, which began at so many rows.
+    pub(crate) fn singles_are_done(&self, begun_at: u64) {
+        let took = self.rows().saturating_sub(begun_at);
+        // a later search is in a part
+        let _ = (self.all.singles).compare_exchange(0, took, Ordering::Relaxed, Ordering::Relaxed);
+    }
+
+    /// Rows so far.
+    pub(crate) fn rows(&self) -> u64 {
+        self.all.rows.load(Ordering::Relaxed)
+    }
+
+    /// Whether all causes may be looked at once more; what may not is remembered.
+    pub(crate) fn may_begin_again(&self) -> bool {
+        self.is_below(ROWS_OF_ALL.saturating_sub(self.all.singles.load(Ordering::Relaxed)))
+    }
+
+    /// Whether another term may be sought, where the first began at so many rows.
+    pub(crate) fn may_add_a_term(&self, begun_at: u64) -> bool {
+        self.rows() < begun_at.saturating_add(ROWS_OF_TERMS)
+    }
+
     /// Whether half of it is left, for what is tried where two searches have failed; what may not begin is remembered.
     pub(crate) fn half_is_left(&self) -> bool {
         self.is_below(ROWS / 2)
@@ -152,7 +182,7 @@ impl Work {
     }
 
     fn is_below(&self, limit: u64) -> bool {
-        let is_below = self.all.rows.load(Ordering::Relaxed) < limit;
+        let is_below = self.rows() < limit;
         if !is_below {
             self.all.cut_at.fetch_max(limit, Ordering::Relaxed);
         }

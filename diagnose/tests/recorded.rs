@@ -102,6 +102,23 @@ fn a_capacitance_at_the_switching_node_is_told_from_delays_and_offsets() {
     assert!((found.value / 6.44e-9 - 1.0).abs() < 0.03, "{}", found.value);
 }
 
+/// A source of 0.2687 ohm, 2.84 uH and 370 uF, and `v_in` measured at the supply in front of it, where nothing drops: at the converter's input, where
+/// it is taken to be, it would drop by a volt.
+#[test]
+fn a_source_is_found_behind_where_v_in_is_measured() {
+    let findings = findings("in_front", &[]);
+    assert_eq!(findings.verdict, Verdict::Explained, "{}", findings.sentence);
+    assert_eq!(ids(&findings), ["source_impedance"], "{}", findings.sentence);
+    let resistance = &findings.causes[0].parameters["resistance"];
+    assert!((resistance.value / 0.2687 - 1.0).abs() < 0.02, "{}", findings.sentence);
+    let is_said = |words: &String| words.contains("in front of the source's resistance");
+    assert!(
+        findings.noise.repairs.iter().any(is_said),
+        "{:?}",
+        findings.noise.repairs
+    );
+}
+
 /// Both edges are late, by 30.15 and 100.5 ns, beside a capacitor of 31.69 uF in the place of 47: the trim had taken the difference, 70 ns, and more
 /// than edges of a gate do, so that nothing was named.
 #[test]

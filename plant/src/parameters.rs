@@ -79,6 +79,12 @@ impl Parameters {
         1.0 / self.converter.f_sw
     }
 
+    /// What the source has at `t` seconds, in front of its impedance, V.
+    #[must_use]
+    pub fn source_voltage(&self, t: f64) -> f64 {
+        self.converter.v_in + crate::effects::input_ripple::voltage(&self.source, t)
+    }
+
     /// The differential capacitance of the output at `v` volts, F.
     #[must_use]
     pub fn capacitance_at(&self, v: f64) -> f64 {

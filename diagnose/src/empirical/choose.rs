@@ -156,7 +156,8 @@ pub fn chosen(problem: &Problem, null: &State, candidates: &[Candidate], folds: 
         }
     };
     let mut path: Vec<Chosen> = Vec::new();
-    while fit.causes.len() < MOST_TERMS {
+    let begun_at = problem.work.rows();
+    while fit.causes.len() < MOST_TERMS && problem.work.may_add_a_term(begun_at) {
         // all of them are fitted: at first order a product of two signals hides behind what the fit already holds
         let terms: Vec<usize> = (0..candidates.len()).filter(|n| !fit.causes.contains(n)).collect();
         let quick = Fitter {

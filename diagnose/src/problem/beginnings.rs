@@ -3,10 +3,11 @@
 use measured::DutyIs;
 use plant::Sensor;
 
-use super::{Problem, Starts};
+use super::{Problem, Starts, dot};
 use crate::drive::{Model, Start};
+use crate::fit::State;
 use crate::ideal::{self, Ideal};
-use crate::record::Record;
+use crate::record::{CHANNELS, Record};
 
 impl Problem {
     /// States to begin with: what was measured in the first rows, as the sensors of `model` show it.
@@ -33,6 +34,40 @@ impl Problem {
                 .collect(),
             trim: 0.0,
         }
+    }
+
+    /// Whether one of the records has a mean square of more than this.
+    pub(crate) fn leaves_more(&self, residual: &[f64], most: f64) -> bool {
+        (0..self.records.len()).any(|index| {
+            let values = self.values_of(residual, index);
+            let count = values.iter().filter(|value| **value != 0.0).count();
+            dot(values, values) > most * count as f64
+        })
+    }
+
+    /// The state whose every record begins as in the one of the two that is nearer to it.
+    pub(crate) fn nearer_of_each(&self, one: State, other: &State) -> State {
+        let squares = |state: &State, index: usize| {
+            let values = self.values_of(&state.residual, index);
+            dot(values, values)
+        };
+        let is_nearer = |index: &usize| squares(other, *index) < squares(&one, *index);
+        let nearer: Vec<usize> = (0..self.records.len()).filter(is_nearer).collect();
+        if nearer.is_empty() {
+            return one;
+        }
+        let mut starts = one.starts.clone();
+        for index in nearer {
+            starts.states[index].clone_from(&other.starts.states[index]);
+        }
+        let mixed = State::at(self, &one.model, starts);
+        if mixed.chi2 < one.chi2 { mixed } else { one }
+    }
+
+    /// What a residual has of the rows of a record.
+    fn values_of<'r>(&self, residual: &'r [f64], index: usize) -> &'r [f64] {
+        let from = self.offsets[index];
+        &residual[from..from + self.records[index].rows() * CHANNELS]
     }
 
     fn guess(&self, record: &Record, row: usize, model: &Model) -> Start {
@@ -78,4 +113,58 @@ fn behind_sensor(record: &Record, row: usize, (mean, volts): (f64, f64), model: 
     let seen = now - sensor.delay / p.t_sw();
     triangle.at(carrier, now) - triangle.at(carrier, seen)
         + triangle.above_shown(carrier, seen, sensor.low_pass / p.t_sw())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+    use std::path::Path;
+
+    use measured::{ColumnMap, Sheet};
+    use plant::Parameters;
+
+    use super::super::Problem;
+    use crate::drive::Model;
+    use crate::fit::State;
+    use crate::record::Record;
+
+    /// Two records at rest, of 100 V and 5 A; the current of one fit begins at 0 in the first of them, that of the other in the second.
+    #[test]
+    fn each_record_begins_as_in_the_nearer_of_two_fits() {
+        let plant = Parameters::paper_table();
+        let record = |name: &str| {
+            let mut text = "t,d,v_o,i_l,i_load\n".to_owned();
+            for n in 0..60 {
+                let noise = f64::from(n * 7 % 5) - 2.0;
+                let _ = writeln!(
+                    text,
+                    "{:.5},0.5,{:.3},{:.3},5",
+                    f64::from(n) * 1e-4,
+                    100.0 + 0.01 * noise,
+                    5.0 + 0.01 * noise
+                );
+            }
+            let sheet = Sheet::parse(Path::new(name), text.into(), &Record::file_options()).unwrap();
+            Record::read(&sheet, &ColumnMap::default(), &plant).unwrap()
+        };
+        let model = Model::new(&plant);
+        let mut problem = Problem::new(vec![record("first.csv"), record("second.csv")], model.clone());
+        problem.sigma = [0.1, 0.1, f64::INFINITY, f64::INFINITY];
+        let begun = problem.first_starts(&model);
+        let without_current = |index: usize| {
+            let mut starts = begun.clone();
+            starts.states[index][0][1] = 0.0;
+            State::at(&problem, &model, starts)
+        };
+        let [one, other] = [without_current(0), without_current(1)];
+        let both = State::at(&problem, &model, begun);
+        assert!(both.chi2 < 0.5 * one.chi2 && both.chi2 < 0.5 * other.chi2);
+        let bound = 0.5 * (both.chi2 + one.chi2) / problem.count() as f64;
+        assert!(problem.leaves_more(&one.residual, bound) && !problem.leaves_more(&both.residual, bound));
+        for (mine, its) in [(one.clone(), &other), (other.clone(), &one)] {
+            assert_eq!(problem.nearer_of_each(mine, its).starts.states, both.starts.states);
+        }
+        // nothing is better in another fit of the same
+        assert_eq!(problem.nearer_of_each(both.clone(), &one).chi2, both.chi2);
+    }
 }

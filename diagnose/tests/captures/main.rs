@@ -138,6 +138,46 @@ fn a_capture_breaks_the_ties_of_a_duty_sweep() {
     assert_eq!(both.findings.causes[0].id, "diode");
 }
 
+/// A first simulation without any loss: a sweep and one capture of output and switch node show a drop, a slope and an ESR. What could stand in the
+/// place of each is less usual, or the same resistance at another place of the loop.
+#[test]
+fn a_sweep_and_a_capture_of_a_board_whose_model_has_no_losses_give_its_resistances_and_its_drop() {
+    const NODE: Scope = Scope {
+        channels: &[("v_out", 16.0, 0.0), ("v_sw", 40.0, 0.0)],
+        ..CLEAN
+    };
+    let mut model = truth();
+    (model.inductor.dcr, model.capacitor.esr) = (0.0, 0.0);
+    (model.switch.r_ds_on, model.switch.v_f, model.switch.r_d) = (0.0, 0.0, 0.0);
+    // currents at which a resistance is more than the edges of a gate
+    let load = 4.0;
+    let row = |duty: f64| {
+        let board = run(
+            &format!("lossy{duty}"),
+            duty,
+            load,
+            duty * 23.5 - 0.5 * (1.0 - duty),
+            "40n",
+        );
+        format!("{duty},{:.3},{load}\n", board.mean(&board.v_out))
+    };
+    let rows: String = [0.2, 0.35, 0.5, 0.65, 0.8].map(row).concat();
+    let sweep = read(&format!("duty,v_out,r_load\n{rows}"), "", &model).unwrap();
+    let capture = read(&NODE.table(half()), "r_load=10", &model).unwrap();
+    let found = diagnosed(&model, vec![sweep, capture]).findings;
+    assert!(
+        matches!(found.verdict, Verdict::Explained | Verdict::Ambiguous),
+        "{}",
+        found.sentence
+    );
+    let v_f = found
+        .causes
+        .iter()
+        .find(|cause| cause.id == "diode")
+        .map(|cause| &cause.parameters["v_f"]);
+    assert!(v_f.is_some_and(|v_f| v_f.low < 0.45 && 0.45 < v_f.high), "{v_f:?}");
+}
+
 #[test]
 fn a_current_that_rests_is_seen_and_its_slope_still_tells_the_inductance() {
     let board = run("light", 0.4, 100.0, 13.6, "10n");

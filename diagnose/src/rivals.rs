@@ -64,8 +64,8 @@ fn interval(attribution: &Attribution, fit: &Fit, number: usize, [low, high, _]:
 }
 
 /// Among explanations of as many causes that the data cannot put in order the most usual one leads, of these the one with the fewest numbers:
-/// copper and diode before the gain of a probe and a counter of few counts. What it replaces becomes its rival. One that ends at the limit of what is tried leads nothing that another explains
-/// as well: it is no explanation, and no rival either.
+/// copper and diode before the gain of a probe and a counter of few counts. What it replaces becomes its rival. One that ends at the limit of
+/// what is tried leads nothing that another explains as well: it is no explanation, and no rival either.
 pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution, say: Listener<'_>) {
     let Some(best) = &attribution.best else { return };
     let own = attribution.least_usual_first(best);
@@ -166,10 +166,10 @@ impl Attribution {
         let old: Vec<Option<usize>> = leader.causes.iter().map(place).collect();
         let replaced = (0..best.causes.len()).find(|member| !leader.causes.contains(&best.causes[*member]));
         let of_replaced = replaced.map_or(0.0, |member| self.evidence[member]) - more;
-        self.evidence = (old
+        let evidence = old
             .iter()
-            .map(|place| place.map_or(of_replaced, |place| self.evidence[place])))
-        .collect();
+            .map(|place| place.map_or(of_replaced, |place| self.evidence[place]));
+        self.evidence = evidence.collect();
         let mut rivals = vec![Vec::new(); leader.causes.len()];
         let before = (!is_out).then_some((usize::MAX, best));
         let others = std::mem::take(&mut self.rivals).into_iter().enumerate();

@@ -273,10 +273,7 @@ impl Attribution {
             let candidate = &self.candidates[best.causes[*member]];
             let values: Vec<f64> = own(*member).map(|profile| profile.value).collect();
             let sizes = candidate.sizes();
-            let evidence = self.evidence.get(*member).copied().unwrap_or(0.0);
-            // of two numbers each may be nothing beside the other, and both not
-            let is_held = sizes > 1 && evidence >= threshold(values.len(), self.inflation);
-            candidate.is_nothing(&values) || sizes > 0 && !is_held && own(*member).take(sizes).all(Profile::holds_own)
+            candidate.is_nothing(&values) || sizes > 0 && own(*member).take(sizes).all(Profile::holds_own)
         };
         let out: Vec<usize> = (0..best.causes.len()).filter(is_nothing).collect();
         self.leave_out(problem, profiles, &out)

@@ -5,7 +5,7 @@ use toml_input::{Fault, Faults, Message, Sink};
 use crate::catalogue;
 use crate::effects::duty_delay;
 use crate::parameters::{Parameters, Topology};
-use crate::rate;
+use crate::rate::{self, Pace};
 use crate::sensing;
 use crate::signals::Load;
 
@@ -71,7 +71,7 @@ const MOST_STEPS: f64 = 1e6;
 
 /// A time constant that would have the simulation of a period go on for ever.
 fn too_fast(p: &Parameters) -> Option<(&'static str, Message)> {
-    let (key, rate) = rate::fastest(p);
+    let (key, rate) = rate::fastest(p, Pace::Fine);
     let steps = rate * p.t_sw();
     let message = || {
         Message::new(format!("`{key}` makes a time constant too short to be simulated"))

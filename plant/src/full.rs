@@ -31,7 +31,7 @@ use crate::entry::Way;
 use crate::lag;
 use crate::parameters::Parameters;
 use crate::plain::Track;
-use crate::rate::{self, has_c_in};
+use crate::rate::{self, Pace, has_c_in};
 use crate::signals::{Load, Signals};
 
 /// Number of states.
@@ -103,6 +103,8 @@ pub(crate) struct Full {
     #[serde(default = "linear")]
     is_core_linear: bool,
     low_pass: [f64; 4],
+    #[serde(default)]
+    pace: Pace,
     /// Fastest rate that does not depend on the load, in steps per second.
     rate: f64,
     /// The sum of those rates, 1/s.
@@ -129,8 +131,8 @@ fn is_affine(p: &Parameters, rate: f64) -> bool {
 
 /// Steps in a switching period without a load: what its simulation takes time for. 0 where the circuit is simple enough to need none.
 #[must_use]
-pub fn steps_per_period(p: &Parameters) -> f64 {
-    let rate = rate::fastest(p).1;
+pub fn steps_per_period(p: &Parameters, pace: Pace) -> f64 {
+    let rate = rate::fastest(p, pace).1;
     match (catalogue::way(p) < Way::Full, is_affine(p, rate)) {
         (true, _) => 0.0,
         (false, true) => affine::FEWER * rate * p.t_sw(),
@@ -147,7 +149,8 @@ impl Full {
             (p.capacitor.derating == 0.0).then(|| 1.0 / p.converter.capacitance),
         ];
         let (has_cable, has_lag) = (p.cable.inductance > 0.0, p.load.cpl_time_constant > 0.0);
-        let rate = rate::fastest(p).1;
+        let pace = Pace::Fine;
+        let rate = rate::fastest(p, pace).1;
         Full {
             p: p.clone(),
             linear,
@@ -158,10 +161,18 @@ impl Full {
             has_many: has_cable || has_lag || has_c_in(p),
             is_wired: has_cable && !has_lag && !has_c_in(p),
             low_pass,
+            pace,
             rate,
             total: rate::total(p),
             is_affine: is_affine(p, rate),
         }
+    }
+
+    /// Steps of another length.
+    pub fn set_pace(&mut self, pace: Pace) {
+        self.pace = pace;
+        self.rate = rate::fastest(&self.p, pace).1;
+        self.is_affine = is_affine(&self.p, self.rate);
     }
 
     /// States at rest around `v_out` and `i_l`.
@@ -236,17 +247,18 @@ impl Full {
         if let Some(few) = Few::new(self, path, load) {
             return self.advance_few(&few, x, path, load, span, track);
         }
-        if self.is_wired {
-            let algebra = |x: &[f64; WIRED], t: f64| self.algebra(x, path, load, t);
-            return self.advance_first(x, path, load, span, track, algebra);
+        let near = self.core_near(x, path);
+        macro_rules! advance {
+            ($n:expr) => {
+                self.advance_first(x, path, load, span, track, |x: &[f64; $n], t| {
+                    self.algebra_near(x, path, load, t, &near)
+                })
+            };
         }
-        match self.has_many {
-            true => self.advance_first(x, path, load, span, track, |x: &[f64; SHOWN], t| {
-                self.algebra(x, path, load, t)
-            }),
-            false => self.advance_first(x, path, load, span, track, |x: &[f64; FEW], t| {
-                self.algebra(x, path, load, t)
-            }),
+        match (self.is_wired, self.has_many) {
+            (true, _) => advance!(WIRED),
+            (false, true) => advance!(SHOWN),
+            (false, false) => advance!(FEW),
         }
     }
 
@@ -299,7 +311,7 @@ impl Full {
         let rate = match self.linear {
             [Some(_), Some(_)] => self.rate,
             // that of the worst current and voltage is known to be enough
-            _ => rate::fastest_near(&self.p, &before.signals, h).min(self.rate),
+            _ => rate::fastest_near(&self.p, self.pace, &before.signals, h).min(self.rate),
         };
         // at least one step: an interval of length 0 would be 0 / 0
         let count = (h * rate.max(far)).ceil().max(1.0);

@@ -51,6 +51,7 @@ pub use parameters::{
     Sensors, ShortPulse, Source, Switch, Topology,
 };
 pub use plant::{Plant, PlantState};
+pub use rate::Pace;
 pub use reader::REQUIRED;
 pub use settle::{Regulator, Rest, Settled};
 pub use signals::{Load, Sample, Signals};

@@ -16,6 +16,7 @@ use crate::gates::{Gate, GateTiming, Gates};
 use crate::legs::Legs;
 use crate::parameters::{Model, Parameters};
 use crate::plain::{Drive, Plain, Track};
+use crate::rate::Pace;
 use crate::sensing::{Memory, Sensing, array};
 use crate::signals::{Load, Sample, Signals};
 
@@ -298,6 +299,13 @@ impl Plant {
             return pulse;
         }
         (pulse + self.longer).clamp(0.0, 1.0)
+    }
+
+    /// The same plant with steps of another length; a batch has those of [`Pace::Fine`].
+    #[must_use]
+    pub fn at_pace(mut self, pace: Pace) -> Self {
+        self.full.set_pace(pace);
+        self
     }
 
     /// Makes every pulse longer by this share of the period, shorter where it is negative, behind all that the modulator does. What a gate does by

@@ -1,5 +1,7 @@
 //! How short the steps of the full circuit are: a share of its fastest time constant.
 
+use serde::{Deserialize, Serialize};
+
 use crate::effects::{dcr, derating, saturation};
 use crate::parameters::Parameters;
 use crate::signals::{Load, Signals};
@@ -9,7 +11,29 @@ use crate::signals::{Load, Signals};
 // bounds against ngspice hold (docs/results/plant.md); with steps of the filter twice as long the two ways of computing are
 // 1e-5 V apart
 const FILTER_STEP: f64 = 0.05;
+// a step leaves 3e-6 of the filter's swing, less than those of everything else do
+const COARSE_FILTER_STEP: f64 = 0.2;
 pub(crate) const OTHER_STEP: f64 = 0.25;
+
+/// How long the steps of the filter are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Pace {
+    /// Those with which the bounds against ngspice hold.
+    #[default]
+    Fine,
+    /// Four times as long: for simulations by the ten thousand, of records with noise.
+    Coarse,
+}
+
+impl Pace {
+    /// Steps per time constant of the filter.
+    fn filter_step(self) -> f64 {
+        match self {
+            Pace::Fine => FILTER_STEP,
+            Pace::Coarse => COARSE_FILTER_STEP,
+        }
+    }
+}
 
 /// Whether the source has an input capacitor that matters.
 pub(crate) fn has_c_in(p: &Parameters) -> bool {
@@ -36,12 +60,12 @@ impl Left {
 }
 
 /// The rates of the parts of the circuit without a load: the key of the part, 1/s, and steps per time constant.
-fn rates(p: &Parameters, left: &Left, mut ask: impl FnMut(&'static str, f64, f64)) {
+fn rates(p: &Parameters, left: &Left, pace: Pace, mut ask: impl FnMut(&'static str, f64, f64)) {
     let Left { l, c, falls } = *left;
     let r = dcr::in_series(&p.inductor)
         + p.switch.r_ds_on.max(p.switch.r_ds_on_low).max(p.switch.r_d)
         + p.source.resistance;
-    ask("converter.inductance", 1.0 / (l * c).sqrt(), FILTER_STEP);
+    ask("converter.inductance", 1.0 / (l * c).sqrt(), pace.filter_step());
     if falls && p.inductor.saturation > 0.0 && p.inductor.steepness > 1.0 {
         // a step each time the current passes the width of the fall, at the slope that it has in the middle: longer ones jump over it
         let middle = p.converter.inductance * (1.0 - 0.5 * p.inductor.saturation);
@@ -82,13 +106,13 @@ fn rates(p: &Parameters, left: &Left, mut ask: impl FnMut(&'static str, f64, f64
 }
 
 /// Steps per second that the parts of the circuit ask for without a load, and the key of the part that asks for most.
-pub(crate) fn fastest(p: &Parameters) -> (&'static str, f64) {
-    fastest_of(p, &Left::least(p))
+pub(crate) fn fastest(p: &Parameters, pace: Pace) -> (&'static str, f64) {
+    fastest_of(p, &Left::least(p), pace)
 }
 
-fn fastest_of(p: &Parameters, left: &Left) -> (&'static str, f64) {
+fn fastest_of(p: &Parameters, left: &Left, pace: Pace) -> (&'static str, f64) {
     let mut fastest = ("", f64::NEG_INFINITY);
-    rates(p, left, |key, rate, step| {
+    rates(p, left, pace, |key, rate, step| {
         if fastest.0.is_empty() || rate / step > fastest.1 {
             fastest = (key, rate / step);
         }
@@ -101,7 +125,7 @@ const HARDLY: f64 = 0.01;
 
 /// [`fastest`] over the next `h` seconds, where current and voltage are known to begin with: a curve that could leave a tenth, and leaves nine
 /// tenths there, asks for a third of the steps.
-pub(crate) fn fastest_near(p: &Parameters, at: &Signals, h: f64) -> f64 {
+pub(crate) fn fastest_near(p: &Parameters, pace: Pace, at: &Signals, h: f64) -> f64 {
     let least = Left::least(p);
     let (inductance, capacitance) = (p.converter.inductance, p.converter.capacitance);
     // no path puts more on the inductor than source and output together; what is left of it where that leads says how far it leads
@@ -116,13 +140,13 @@ pub(crate) fn fastest_near(p: &Parameters, at: &Signals, h: f64) -> f64 {
         c: c_at(v).max(least.c),
         falls: saturation::relative_inductance(&p.inductor, i) < 1.0 - HARDLY * p.inductor.saturation,
     };
-    fastest_of(p, &left).1
+    fastest_of(p, &left, pace).1
 }
 
 /// The sum of the rates of the parts without a load, 1/s.
 pub(crate) fn total(p: &Parameters) -> f64 {
     let mut total = 0.0;
-    rates(p, &Left::least(p), |_, rate, _| total += rate);
+    rates(p, &Left::least(p), Pace::Fine, |_, rate, _| total += rate);
     total
 }
 
@@ -137,7 +161,7 @@ pub(crate) fn of_load(p: &Parameters, load: &Load) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{fastest, fastest_near};
+    use super::{Pace, fastest, fastest_near};
     use crate::parameters::Parameters;
     use crate::signals::Signals;
 
@@ -153,7 +177,7 @@ mod tests {
             i_out: i_l,
             v_in: 48.0,
         };
-        let near = |i_l: f64| fastest_near(&bent, &at(i_l), 2.5e-6) / fastest(&linear).1;
+        let near = |i_l: f64| fastest_near(&bent, Pace::Fine, &at(i_l), 2.5e-6) / fastest(&linear, Pace::Fine).1;
         // 5 A and at most 7.5 A of ripple: L is 1 - .99 (.125)^2 of its own, and the steps grow by the root
         assert!((1.0..1.02).contains(&near(5.0)), "{}", near(5.0));
         // at i_sat half of it is left, and less where the current goes on

@@ -1,7 +1,8 @@
 //! What follows from the states at once: both algebraic voltages, the currents, the slopes.
 
-use super::{Algebra, FEW, Full, I_CABLE, I_CPL, I_L, I_SOURCE, Path, V_C, V_CIN, V_LOAD};
-use crate::effects::{core_loss, dcr, derating, input_ripple, saturation};
+use super::{Algebra, FEW, Full, I_CABLE, I_CPL, I_L, I_SOURCE, Path, States, V_C, V_CIN, V_LOAD};
+use crate::effects::core_loss::Near;
+use crate::effects::{dcr, derating, input_ripple, saturation};
 use crate::signals::{Load, Signals};
 
 impl Full {
@@ -33,6 +34,28 @@ impl Full {
     }
 
     pub(super) fn algebra<const N: usize>(&self, x: &[f64; N], path: &Path, load: &Load, t: f64) -> Algebra<N> {
+        self.algebra_near(x, path, load, t, &Near::NOWHERE)
+    }
+
+    /// What a core that is no conductor does at the start of an interval.
+    pub(super) fn core_near(&self, x: &States, path: &Path) -> Near {
+        if self.is_core_linear || path.open {
+            return Near::NOWHERE;
+        }
+        let v_in = if self.has_c_in { x[V_CIN] } else { self.p.converter.v_in };
+        let drive = path.share * v_in + path.emf - path.r * x[I_L];
+        Near::new(&self.p, drive - path.give * x[V_C])
+    }
+
+    /// [`Full::algebra`] beside a known conductance of the core.
+    pub(super) fn algebra_near<const N: usize>(
+        &self,
+        x: &[f64; N],
+        path: &Path,
+        load: &Load,
+        t: f64,
+        near: &Near,
+    ) -> Algebra<N> {
         let p = &self.p;
         // divisions are what a step costs most: none for a part that does not change, nor for one that is not there
         let per_l = self.linear[0]
@@ -46,7 +69,7 @@ impl Full {
         let core = match self.is_core_linear {
             true => p.inductor.core_conductance,
             // but for what its own current and the ESR drop, hundredths of that voltage
-            false => core_loss::conductance(p, drive - path.give * x[V_C]),
+            false => near.conductance(p, drive - path.give * x[V_C]),
         };
         let shrunk = if core == 0.0 { 1.0 } else { 1.0 / (1.0 + r * core) };
         let reflected = match path.open {

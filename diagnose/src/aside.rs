@@ -16,15 +16,15 @@ use crate::doubts::Doubt;
 use crate::drive::Model;
 use crate::examine::{Examined, examined};
 use crate::findings::{Aside, Verdict};
-use crate::fit::{Fit, Fitter, ROUGH, State};
+use crate::fit::{Fitter, ROUGH, State};
 use crate::gain::{self, Pair};
 use crate::instants;
 use crate::level::threshold;
 use crate::noise;
-use crate::parallel;
 use crate::problem::{Problem, dot};
 use crate::progress::{Listener, Progress};
 use crate::record::{CHANNEL_NAMES, CHANNELS, LOAD_CURRENT, Record};
+use crate::search::WithoutChannel;
 use crate::shape::{self, Structure, structures};
 use crate::worth;
 
@@ -33,9 +33,6 @@ use crate::worth;
 const LOOKS: usize = 2;
 /// Without a part that is set aside at least this share of what is left is gone: less would not be "all but one". A convention.
 const MAIN_PART: f64 = 0.25;
-/// Single causes that are fitted without a part, to see how much of the rest one of them explains. As many as are fitted after a linear look in
-/// the search: a convention.
-const LEADERS: usize = 5;
 /// Fewest rows of a record: settled points and short tables have more causes than places for structure.
 // five blocks of ten, from which on `shape` sees slow structure
 const FEWEST_ROWS: usize = 50;
@@ -249,24 +246,13 @@ fn above(problem: &Problem, state: &State, counts: impl Fn(usize, usize) -> bool
 /// What the best of the causes that lead leaves above the noise where channel `n` is not compared.
 fn left_by_one_cause(whole: &Examined, n: usize) -> f64 {
     let attribution = &whole.attribution;
-    let mut problem = whole.problem.clone();
-    for masked in &mut problem.masked {
-        masked[n].fill(true);
-    }
-    let null = State::settle(&problem, &attribution.null.model, &attribution.null.starts, None);
-    let basis = problem.basis(&null.model, &null.starts, &null.residual);
     let fitter = Fitter {
-        problem: &problem,
-        candidates: &attribution.candidates,
-        basis: &basis,
-        null: &null,
         effort: ROUGH,
+        ..attribution.fitter(&whole.problem)
     };
-    let mut singles: Vec<&Fit> = attribution.singles.iter().collect();
-    singles.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
-    let fits = parallel::map(&singles[..LEADERS.min(singles.len())], |fit| {
-        fitter.from(&fit.causes, &fit.values, &null)
-    });
+    let WithoutChannel {
+        problem, null, fits, ..
+    } = WithoutChannel::of(&fitter, &attribution.singles, n);
     let left = |problem: &Problem, state: &State| above(problem, state, |_, _| true);
     let states = fits.iter().map(|fit| &fit.state).chain([&null]);
     let best = states.min_by(|a, b| left(&problem, a).total_cmp(&left(&problem, b)));
@@ -277,7 +263,7 @@ fn left_by_one_cause(whole: &Examined, n: usize) -> f64 {
 }
 
 /// Whether enough is measured without a channel, and it is no input of the model.
-fn may_miss(problem: &Problem, channel: usize) -> bool {
+pub(crate) fn may_miss(problem: &Problem, channel: usize) -> bool {
     let is_measured = |n: usize| problem.sigma[n].is_finite();
     let is_load = channel == LOAD_CURRENT && problem.records.iter().any(|record| record.metered.is_some());
     let left = (0..CHANNELS).filter(|n| *n != channel && is_measured(*n)).count();

@@ -2,8 +2,7 @@
 //! as well beside them.
 
 use crate::basis::Basis;
-use crate::causes::{Candidate, Search, candidates};
-use crate::coloured;
+use crate::causes::{Candidate, candidates};
 use crate::fit::{FINE, Fit, Fitter, ROUGH, State};
 use crate::in_front;
 use crate::inside::Inside;
@@ -12,7 +11,6 @@ use crate::level::threshold;
 use crate::noise;
 use crate::parallel;
 use crate::problem::{Problem, dot};
-use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::record::Record;
 use crate::search::{Known, Searcher, gained};
@@ -220,10 +218,6 @@ fn completed(search: &Searcher<'_>, singles: Vec<Fit>, (best, evidence): (Option
     }
 }
 
-/// Share of the error above the noise that makes a counter the whole of it: what a limit cycle leaves beside a counter that imitates it is far more than
-/// a fiftieth. A convention.
-const ALL_OF_IT: f64 = 0.98;
-
 impl Attribution {
     /// To fit more.
     #[must_use]
@@ -260,139 +254,6 @@ impl Attribution {
         } else {
             0.0
         }
-    }
-
-    /// Takes out causes that are no effect: by their size, or because the interval of each parameter that makes it holds
-    /// the model's own value. Their ids.
-    pub fn leave_out_nothing(&mut self, problem: &Problem, profiles: &mut Vec<Profile>) -> Vec<&'static str> {
-        let Some(best) = self.best.clone() else {
-            return Vec::new();
-        };
-        let own = |member: usize| profiles.iter().filter(move |profile| profile.member == member);
-        let is_nothing = |member: &usize| {
-            let candidate = &self.candidates[best.causes[*member]];
-            let values: Vec<f64> = own(*member).map(|profile| profile.value).collect();
-            let sizes = candidate.sizes();
-            candidate.is_nothing(&values) || sizes > 0 && own(*member).take(sizes).all(Profile::holds_own)
-        };
-        let out: Vec<usize> = (0..best.causes.len()).filter(is_nothing).collect();
-        self.leave_out(problem, profiles, &out)
-    }
-
-    /// Takes out causes whose evidence is too weak for the colour of what is left, or that are a rhythm of the rows; `beside_line` if a line
-    /// is there, with the model as given or in the end. Their ids. For the time before there are profiles.
-    pub fn leave_out_coloured(&mut self, problem: &Problem, beside_line: bool) -> Vec<&'static str> {
-        let Some(best) = self.best.clone() else {
-            return Vec::new();
-        };
-        let scatter = coloured::scatter(problem, self);
-        let sure = if beside_line { SURE } else { 1.0 };
-        let is_weak = |member: &usize| {
-            let parameters = self.candidates[best.causes[*member]].own.len();
-            let form = self.candidates[best.causes[*member]].form;
-            // to which counts a duty is rounded nobody knows where the duty itself goes to and fro; but of a counter that makes all of it the line may
-            // be, where a bench steps its duty in a rhythm
-            let makes_all = self.evidence[*member] > ALL_OF_IT * (self.null.chi2 - problem.count() as f64);
-            let is_of_counts = beside_line && !makes_all && matches!(form.search, Search::Counter(_));
-            let inflation = scatter[*member].max(sure * self.inflation);
-            let chance = self.chance(problem, *member) * inflation;
-            let evidence = match chance > 0.0 {
-                true => self.evidence[*member].max(self.of_voltage(problem) * inflation),
-                false => self.evidence[*member],
-            };
-            evidence < threshold(parameters, inflation) + chance
-                || is_of_counts
-                || coloured::is_of_rows(problem, self, *member)
-        };
-        let weak: Vec<usize> = (0..best.causes.len()).filter(is_weak).collect();
-        let places = self.fitter(problem).places(&best.causes);
-        let member = |place: &(usize, usize)| best.causes.iter().position(|cause| *cause == place.0).unwrap_or(0);
-        let mut at_best: Vec<Profile> = (places.iter().zip(&best.values))
-            .map(|(place, value)| Profile::at(member(place), *value))
-            .collect();
-        self.leave_out_weak(problem, &mut at_best, weak)
-    }
-
-    /// Twice the logarithm of the likelihood that one cause wins in the voltage, whose noise few rows tell poorly and a rounding makes look larger: that
-    /// of any noise, n log(S0 / S1). 0 of several causes.
-    fn of_voltage(&self, problem: &Problem) -> f64 {
-        let alone = self.best.as_ref().is_some_and(|best| best.causes.len() == 1);
-        let values = |state: &State| -> Vec<f64> {
-            let each = (0..problem.records.len()).flat_map(|n| noise::channel(problem, &state.residual, n, 0));
-            each.filter(|value| *value != 0.0).collect()
-        };
-        let [before, after] = [values(&self.null), values(self.state())];
-        match alone && !after.is_empty() {
-            true => after.len() as f64 * libm::log(dot(&before, &before) / dot(&after, &after)),
-            false => 0.0,
-        }
-    }
-
-    /// Chi-square that the best of all counters wins by chance, of a member that is one; 0 of others: twice the logarithm of the ways in which the duties
-    /// of the records are rounded by counters up to this, as [`instants::PRICE`] is of the instants that are told apart.
-    fn chance(&self, problem: &Problem, member: usize) -> f64 {
-        let Some(best) = &self.best else { return 0.0 };
-        let places = self.fitter(problem).places(&best.causes);
-        let number = places.iter().position(|place| place.0 == best.causes[member]);
-        let step = number.and_then(|number| best.values.get(number));
-        match (self.candidates[best.causes[member]].form.search, step) {
-            (Search::Counter(_), Some(step)) if *step > 0.0 => {
-                let mut duties: Vec<f64> = problem.records.iter().flat_map(|r| r.duty.iter().copied()).collect();
-                duties.sort_by(f64::total_cmp);
-                duties.dedup();
-                2.0 * libm::log((duties.iter().sum::<f64>() / step).max(1.0))
-            }
-            _ => 0.0,
-        }
-    }
-
-    /// [`Attribution::leave_out`] of causes whose evidence is too weak, but for one that moves edges where the trim would do more than edges
-    /// can in its place: the trim takes over what such a cause does, so that its evidence is small, and is none all the same.
-    pub fn leave_out_weak(
-        &mut self,
-        problem: &Problem,
-        profiles: &mut Vec<Profile>,
-        mut weak: Vec<usize>,
-    ) -> Vec<&'static str> {
-        let mut without = self.clone();
-        let mut left = profiles.clone();
-        let out = without.leave_out(problem, &mut left, &weak);
-        if without.asks_for_edges() && !self.asks_for_edges() {
-            let causes = self.best.as_ref().map_or(&[][..], |best| &best.causes);
-            weak.retain(|member| !self.candidates[causes[*member]].is_of_edges());
-            return self.leave_out(problem, profiles, &weak);
-        }
-        *self = without;
-        *profiles = left;
-        out
-    }
-
-    /// Whether the edges of the gate do more than edges can where the best explanation ends.
-    fn asks_for_edges(&self) -> bool {
-        let state = self.state();
-        let f_sw = state.model.plant.converter.f_sw;
-        state.starts.trim_of_nobody(f_sw).is_some()
-    }
-
-    /// Takes causes out, by their places, and fits the others again. Their ids.
-    pub fn leave_out(&mut self, problem: &Problem, profiles: &mut Vec<Profile>, out: &[usize]) -> Vec<&'static str> {
-        let Some(best) = self.best.clone().filter(|_| !out.is_empty()) else {
-            return Vec::new();
-        };
-        let own = |member: usize| profiles.iter().filter(move |profile| profile.member == member);
-        let kept: Vec<usize> = (0..best.causes.len()).filter(|member| !out.contains(member)).collect();
-        let causes: Vec<usize> = kept.iter().map(|member| best.causes[*member]).collect();
-        let values: Vec<f64> = kept.iter().flat_map(|m| own(*m).map(|profile| profile.value)).collect();
-        let fit = (!causes.is_empty()).then(|| self.fitter(problem).from(&causes, &values, &self.null));
-        self.evidence = kept.iter().map(|member| self.evidence[*member]).collect();
-        self.rivals = kept.iter().map(|member| self.rivals[*member].clone()).collect();
-        profiles.retain(|profile| kept.contains(&profile.member));
-        for profile in profiles {
-            // always found: `retain` has left only members that are kept
-            profile.member = kept.iter().position(|m| *m == profile.member).unwrap_or(0);
-        }
-        self.best = fit;
-        out.iter().map(|member| self.id(best.causes[*member])).collect()
     }
 
     /// Whether two candidates are forms of one cause.

@@ -15,7 +15,7 @@ use crate::drive::Model;
 use crate::empirical::{self, Described};
 use crate::examine::{Examined, examined};
 use crate::extend;
-use crate::findings::{Findings, Gain, Hidden, Named, Noise, Verdict};
+use crate::findings::{Aside, Findings, Gain, Hidden, Named, Noise, Verdict};
 use crate::fit::State;
 use crate::gain::{Pair, Shift};
 use crate::held_out::held;
@@ -113,8 +113,7 @@ pub fn diagnose_knowing(
         one
     });
     let (mut state, mut empirical) = (state, None);
-    // causes that leave only noise leave nothing to describe, whatever speaks against them: a term would imitate them
-    if !found.structure.is_empty() && found.is_of_a_converter() && (!explained || set_aside.is_some()) {
+    if asks_for_a_term(&found, explained, set_aside.as_ref()) {
         say(Progress::Stage("empirical term"));
         let problem = whole_problem.as_ref().unwrap_or(&found.problem);
         empirical = described(problem, heldout, &base, (&mut state.model, trim), &mut pair);
@@ -239,6 +238,16 @@ fn read_off(problem: &Problem, model: &Parameters) -> Vec<Estimates> {
         Some(estimates::of(capture, &driven, model))
     };
     problem.records.iter().filter_map(of).collect()
+}
+
+/// Whether something is left that a term could describe. Causes that leave only noise leave nothing, whatever speaks against them: a term would imitate
+/// them. Nor does a channel that was set aside: what corrects the duty moves the others, which need nothing.
+fn asks_for_a_term(found: &Examined, explained: bool, aside: Option<&Aside>) -> bool {
+    let is_to_describe = match aside {
+        None => !explained,
+        Some(aside) => aside.channel.is_none(),
+    };
+    is_to_describe && !found.structure.is_empty() && found.is_of_a_converter()
 }
 
 /// The term that describes what `model`, with its trim, leaves; model and held-out records follow it where it is written.

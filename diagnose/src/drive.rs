@@ -11,7 +11,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use measured::{DutyIs, Sampled};
-use plant::{Carrier, Load, Parameters, Plant, Rectifier, Signals};
+use plant::{Carrier, Load, Pace, Parameters, Plant, Rectifier, Signals};
 
 use crate::record::{CHANNELS, Record, Segment, V_IN};
 use crate::resistors::{self, Resistor};
@@ -111,6 +111,10 @@ pub fn simulate(model: &Model, record: &Record, begin: &Begin<'_>) -> Vec<[f64; 
     simulate_counted(model, record, begin).0
 }
 
+/// Steps of the plant in a fit.
+// their error is a thousandth of a record's noise and less, and they take a half to three quarters of the time
+pub(crate) const PACE: Pace = Pace::Coarse;
+
 /// What a simulation took time for.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Ran {
@@ -182,9 +186,10 @@ pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>
             p.source.ripple_phase = turns - turns.floor();
         }
         // a fit may try numbers that are no converter: NaN costs it that step, and not the diagnosis
-        let Ok(mut plant) = Plant::new(&p) else {
+        let Ok(plant) = Plant::new(&p) else {
             return (shown, ran);
         };
+        let mut plant = plant.at_pace(PACE);
         plant.lengthen(longer);
         match record.settled {
             true if driver.repeats(segment.start) => shown[segment.start] = shown[segment.start - 1],
@@ -362,7 +367,7 @@ impl Driver<'_> {
     fn settle(&self, plant: &mut Plant, row: usize, start: &Start, shown: &mut [[f64; CHANNELS]]) -> u64 {
         let (duty, load) = (self.record.duty[row], &self.load[row]);
         plant.reset_within(start[0], start[1], load, &[duty; HISTORY]);
-        let steps = plant::steps_per_period(plant.parameters()).max(1.0);
+        let steps = plant::steps_per_period(plant.parameters(), PACE).max(1.0);
         let most = (MOST_STEPS / steps).max(LEAST_PERIODS) as u32;
         let found = plant.rest_within(duty, load, most.min(MOST_PERIODS));
         shown[row] = array(&found.sample.measured);

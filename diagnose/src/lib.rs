@@ -48,6 +48,7 @@ mod in_front;
 mod inside;
 mod instants;
 mod judge;
+
 mod left_open;
 mod left_out;
 mod level;
@@ -76,6 +77,7 @@ mod sides;
 mod slopes;
 mod small;
 mod spectrum;
+mod taken_out;
 pub mod ties;
 pub mod timing;
 mod unseen;

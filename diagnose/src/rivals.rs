@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use crate::attribute::Attribution;
+use crate::attribute::{Attribution, searcher};
 use crate::causes::{Kind, Knob};
 use crate::doubts;
-use crate::fit::Fit;
+use crate::fit::{Fit, State};
 use crate::problem::Problem;
 use crate::profile::Profile;
 use crate::progress::{self, Listener};
@@ -67,6 +67,10 @@ fn interval(attribution: &Attribution, fit: &Fit, number: usize, [low, high, _]:
 /// copper and diode before the gain of a probe and a counter of few counts. What it replaces becomes its rival. One that ends at the limit of
 /// what is tried leads nothing that another explains as well: it is no explanation, and no rival either.
 pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution, say: Listener<'_>) {
+    let crossed = crossed(problem, attribution, say);
+    for (member, fit) in crossed {
+        attribution.rivals[member].push(fit);
+    }
     let Some(best) = &attribution.best else { return };
     let own = attribution.least_usual_first(best);
     let is_out = |of: &[Usual]| of.first().is_some_and(|least| least.is_at_bound);
@@ -100,9 +104,73 @@ pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution, say: L
     }
 }
 
+/// Sets with the most usual rivals of two causes in the places of both, where that is more usual than what leads: each was tried beside the other cause
+/// alone. With the place of the first.
+fn crossed(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> Vec<(usize, Fit)> {
+    let Some(best) = &attribution.best else {
+        return Vec::new();
+    };
+    let mut each: Vec<(usize, usize, &Fit)> = in_one_place(attribution).collect();
+    each.sort_by_cached_key(|(member, other, fit)| (*member, attribution.usual(fit, *other)));
+    let two = each
+        .iter()
+        .enumerate()
+        .flat_map(|(n, one)| each[n + 1..].iter().map(move |other| (one, other)));
+    let is_new = |(one, other): &(&(usize, usize, &Fit), &(usize, usize, &Fit))| {
+        let rank = |of: &(usize, usize, &Fit)| {
+            each.iter()
+                .filter(|known| known.0 == of.0)
+                .position(|known| known.1 == of.1)
+        };
+        let is_first = |of| rank(of).is_some_and(|place| place < CROSSED);
+        one.0 != other.0 && !attribution.same(one.1, other.1) && is_first(one) && is_first(other)
+    };
+    let sets: Vec<_> = two.filter(is_new).collect();
+    let fitter = attribution.fitter(problem);
+    let search = searcher(
+        problem,
+        &attribution.candidates,
+        &attribution.basis,
+        &attribution.null,
+        say,
+    );
+    let fits = progress::map(say, "rivals of two causes", &sets, |(one, other)| {
+        let own = |cause: usize, fit: &Fit| {
+            let places = fitter.places(&fit.causes);
+            let values = places
+                .iter()
+                .zip(&fit.values)
+                .filter(move |(place, _)| place.0 == cause);
+            values.map(|(_, value)| *value).collect::<Vec<f64>>()
+        };
+        let member = |(member, cause): (usize, &usize)| match member {
+            _ if member == one.0 => (one.1, own(one.1, one.2)),
+            _ if member == other.0 => (other.1, own(other.1, other.2)),
+            _ => (*cause, own(*cause, best)),
+        };
+        let (causes, values): (Vec<usize>, Vec<Vec<f64>>) = best.causes.iter().enumerate().map(member).unzip();
+        // where the rival has them: what the edges do of themselves would be the trim's again
+        let begun = State {
+            model: attribution.null.model.clone(),
+            ..one.2.state.clone()
+        };
+        (
+            one.0,
+            search.without_trim(fitter.from(&causes, &values.concat(), &begun)),
+        )
+    });
+    let usual = attribution.least_usual_first(best);
+    let worst = best.state.chi2 + LEVEL * attribution.inflation;
+    let leads = |(_, fit): &(usize, Fit)| fit.state.chi2 <= worst && attribution.least_usual_first(fit) < usual;
+    fits.into_iter().filter(leads).collect()
+}
+
 /// A number so many times as large as any that is typical is none of this part: a diode of an ohm where a tenth is much. Data sheets
 /// differ by less, and converters of 400 V have other resistances than those of 5 V.
 const UNTYPICAL: f64 = 5.0;
+
+/// Rivals of each place that are tried in two places at once, the most usual ones. A convention: each pair of them costs a fit.
+const CROSSED: usize = 2;
 
 /// How usual a cause with its values is, the most usual first.
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]

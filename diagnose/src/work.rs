@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use crate::drive::{Model, Ran};
+use crate::drive::{Model, PACE, Ran};
 
 /// Rows of a plain converter, and what takes as long, that a diagnosis simulates before it begins nothing more, where the causes found so far
 /// come near. A core does a million in a second.
@@ -128,8 +128,8 @@ impl Work {
     /// Whether a fit may look at a model: a corner of what its parameters may be can take longer than all the rest. A model that was given
     /// as dear as that may become a few times dearer.
     pub(crate) fn may_simulate(model: &Model, base: &Model) -> bool {
-        let given = plant::steps_per_period(&base.plant);
-        plant::steps_per_period(&model.plant) <= MOST_STEPS.max(DEARER * given)
+        let given = plant::steps_per_period(&base.plant, PACE);
+        plant::steps_per_period(&model.plant, PACE) <= MOST_STEPS.max(DEARER * given)
     }
 
     /// Whether a fit has taken all that it may, of records that take `given` rows as the model was given.

@@ -48,17 +48,19 @@ fn in_tie(findings: &Findings, id: &str) -> Option<f64> {
     own.chain(tied).find(|(known, _)| *known == id).map(|(_, value)| value)
 }
 
-/// The diode drops 1.405 V in the place of 0.52 V, and nothing else is hidden.
+/// The diode drops 1.405 V in the place of 0.52 V, and nothing else is hidden. The voltage alone is measured, and 0.9 V more of the source does as well: 2.3
+/// of chi-square apart. Beside the second cause it did not, so that its refutation left the diode without its rival.
 #[test]
 fn a_second_cause_that_the_held_out_record_refutes_is_not_named() {
     let alone = findings("by_chance", &[]);
     let judged = findings("by_chance", &["judge.csv"]);
     // the training records by themselves lend a second cause more than its threshold: else the record judges nothing here
     assert_eq!(alone.causes.len(), 2, "{}", alone.sentence);
-    assert_eq!(judged.verdict, Verdict::Explained, "{}", judged.sentence);
+    assert_eq!(judged.verdict, Verdict::Ambiguous, "{}", judged.sentence);
     assert_eq!(ids(&judged), ["diode"], "{}", judged.sentence);
     let v_f = &judged.causes[0].parameters["v_f"];
     assert!((v_f.value - 1.405).abs() < 0.02, "{}", judged.sentence);
+    assert_eq!(judged.causes[0].rivals, [["v_in_wrong"]], "{}", judged.sentence);
 }
 
 /// A boost whose voltmeter shows 0.443 V too much; the voltage alone was measured, and a diode that drops 0.44 V less does the same. With both in

@@ -179,6 +179,9 @@ pub fn chosen(problem: &Problem, null: &State, candidates: &[Candidate], folds: 
         };
         fit = next.fit.clone();
         path.push(next);
+        if gains_no_more(&path) {
+            break;
+        }
     }
     let best = path.iter().map(|one| one.error).fold(f64::INFINITY, f64::min);
     let enough = (1.0 + ABOUT) * best;
@@ -198,6 +201,14 @@ pub fn chosen(problem: &Problem, null: &State, candidates: &[Candidate], folds: 
         chosen = one;
     }
     Some(chosen)
+}
+
+/// Whether the last two terms have not lowered the left-out error by what a longer path has to: a third that needs both of them beside it is not waited
+/// for.
+fn gains_no_more(path: &[Chosen]) -> bool {
+    let least = |some: &[Chosen]| some.iter().map(|one| one.error).fold(f64::INFINITY, f64::min);
+    let before = path.len().saturating_sub(2);
+    before > 0 && least(&path[before..]) > (1.0 - ABOUT) * least(&path[..before])
 }
 
 /// All rows at `model`; the initial states are those that fit it best, two numbers a record, and nothing else has seen the rows left out.

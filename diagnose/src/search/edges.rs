@@ -89,4 +89,30 @@ impl Searcher<'_> {
         let inside = values.filter(|value| (*low..=*high).contains(value));
         inside.map(|value| (vec![value], without.clone())).collect()
     }
+
+    /// The fit with what the edges do of themselves as the own of one of its causes that moves them, if that is better: the trim costs what such a cause
+    /// does not, but so little that a fit which begins with it keeps it.
+    pub(crate) fn without_trim(&self, fit: Fit) -> Fit {
+        let duty = fit.state.starts.trim;
+        let bases = &self.fitter.problem.bases;
+        let mut begun = fit.state.clone();
+        begun.starts.trim = 0.0;
+        let tried = self
+            .fitter
+            .places(&fit.causes)
+            .into_iter()
+            .enumerate()
+            .filter(|(_, place)| {
+                let candidate = &self.fitter.candidates[place.0];
+                candidate.is_of_edges() && candidate.form.knobs[place.1].unit() == "s"
+            });
+        let tried = tried.flat_map(|(number, _)| [1.0, -1.0].map(|side| (number, side * duty * bases.t_sw)));
+        let fits = tried.map(|(number, by)| {
+            let mut values = fit.values.clone();
+            values[number] += by;
+            self.fitter.from(&fit.causes, &values, &begun)
+        });
+        let best = fits.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+        best.filter(|other| other.state.chi2 < fit.state.chi2).unwrap_or(fit)
+    }
 }

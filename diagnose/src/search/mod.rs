@@ -7,9 +7,11 @@ mod pairs;
 mod replaced;
 mod singles;
 pub(crate) mod sought;
+mod spoilt;
 mod starts;
 mod weigh;
 
+pub(crate) use spoilt::WithoutChannel;
 pub(crate) use starts::Known;
 
 use crate::causes::Search;
@@ -195,31 +197,20 @@ impl Searcher<'_> {
         let mut best = self.polished(first);
         let mut before = null.chi2;
         self.fitter.problem.work.leaves(self.share_left(&best));
+        // one cause explains all but a channel: sets of two are tried in all, and no larger ones
+        let mut is_spoilt = false;
         while best.causes.len() < self.fitter.problem.work.most_causes()
+            && !is_spoilt
             && best.values.len() < most
             && !self.is_hopeless(&best, before)
             && !self.is_out_of_reach(&best.state, &|_| false)
             && self.fitter.problem.work.goes_on()
         {
-            let stage = format!("more than {}", self.names(&best));
-            let mut larger = match best.causes.len() {
-                1 if self.structure(&best) > 0.0 => self.pairs().to_vec(),
-                _ => Vec::new(),
-            };
-            let is_found = !larger.is_empty() && self.has_a_pair();
-            larger.extend(self.forward(&best, LOOKED_AT, &stage));
-            // two causes that resemble each other are best found from the one that explains less alone
-            if !is_found
-                && (self.structure(&best) > 0.0 || larger.iter().any(|fit| self.is_worth(&best, fit)))
-                && self.fitter.problem.work.goes_on()
-            {
-                for leader in self.distinct(&leaders).into_iter().skip(1).take(LEADERS) {
-                    if !self.fitter.problem.work.goes_on() {
-                        break;
-                    }
-                    let stage = format!("{} and another", self.names(leader));
-                    larger.extend(self.forward(leader, LOOKED_AT_BY_LEADERS, &stage));
-                }
+            let mut larger = self.larger(&best, &leaders);
+            if best.causes.len() == 1 && larger.iter().all(|fit| self.structure(fit) > 0.0) {
+                let beside = self.beside_a_channel(&best, singles);
+                is_spoilt = beside.is_some();
+                larger.extend(beside.into_iter().flatten());
             }
             larger.extend(self.with_edges(&best));
             larger.retain(|fit| fit.values.len() <= most);
@@ -232,17 +223,39 @@ impl Searcher<'_> {
             before = best.state.chi2;
             best = self.polished(next);
             // where the edges have to do more than they can, it is another cause as well
-            if self.structure(&best) > 0.0 || self.asks_for_edges(&best.state) {
+            if !is_spoilt && self.structure(&best) > 0.0 || self.asks_for_edges(&best.state) {
                 best = self.reformed(self.swapped(best));
             }
             self.fitter.problem.work.leaves(self.share_left(&best));
             leaders = larger;
         }
         best = self.without_edges(best);
-        if !self.is_hopeless(&best, before) {
+        if !is_spoilt && !self.is_hopeless(&best, before) {
             best = self.reformed(best);
         }
         self.backward(best)
+    }
+
+    /// Sets that have a cause more than `best`, or than the `leaders` behind it.
+    fn larger(&self, best: &Fit, leaders: &[Fit]) -> Vec<Fit> {
+        let stage = format!("more than {}", self.names(best));
+        let mut larger = match best.causes.len() {
+            1 if self.structure(best) > 0.0 => self.pairs().to_vec(),
+            _ => Vec::new(),
+        };
+        let is_found = !larger.is_empty() && self.has_a_pair();
+        larger.extend(self.forward(best, LOOKED_AT, &stage));
+        // two causes that resemble each other are best found from the one that explains less alone
+        if !is_found && (self.structure(best) > 0.0 || larger.iter().any(|fit| self.is_worth(best, fit))) {
+            for leader in self.distinct(leaders).into_iter().skip(1).take(LEADERS) {
+                if !self.fitter.problem.work.goes_on() {
+                    break;
+                }
+                let stage = format!("{} and another", self.names(leader));
+                larger.extend(self.forward(leader, LOOKED_AT_BY_LEADERS, &stage));
+            }
+        }
+        larger
     }
 
     /// The single cause that explains most for its parameters, brought to its end; nothing if none is worth it.
@@ -274,7 +287,9 @@ impl Searcher<'_> {
             effort: FINE,
             ..self.fitter
         };
-        let fine = fitter.from(&fit.causes, &fit.values, &fit.state);
+        let mut fine = fitter.from(&fit.causes, &fit.values, &fit.state);
+        // initial states and instants by what they do here: what they did in the model as given leaves kicks where its filter rings otherwise
+        fine.state = State::settle(self.fitter.problem, &fine.state.model, &fine.state.starts, None);
         let is_step = |place: &(usize, usize)| matches!(self.search(place.0), Search::Counter(_));
         match fitter.places(&fit.causes).iter().position(is_step) {
             Some(place) => self.counted(fine, place),

@@ -48,6 +48,20 @@ impl Searcher<'_> {
             .collect()
     }
 
+    /// What may stand in the place of `own`, and of one that moves the edges all others that do: the trim takes its place where it is left out, so that
+    /// nothing shows at first order.
+    fn with_others_of_edges(&self, own: usize, mut chosen: Vec<usize>) -> Vec<usize> {
+        let is_of_edges = |cause: usize| self.fitter.candidates[cause].is_of_edges();
+        if is_of_edges(own) {
+            let others = self.others(&[own]).into_iter();
+            let more: Vec<usize> = others
+                .filter(|cause| is_of_edges(*cause) && !chosen.contains(cause))
+                .collect();
+            chosen.extend(more);
+        }
+        chosen
+    }
+
     /// For each cause of a set, what explains the data as well in its place.
     pub fn rivals(&self, best: &Fit, evidence: &[f64], singles: &[Fit]) -> Vec<Vec<Fit>> {
         let members = best.causes.iter().enumerate();
@@ -61,7 +75,7 @@ impl Searcher<'_> {
                 // a cause that ended better than alone did so from elsewhere, and from there its rivals may end better as well
                 let is_met = |fit: &Fit| fit.causes == best.causes && fit.state.chi2 <= best.state.chi2 + tolerance;
                 if !all.iter().any(is_met) {
-                    let chosen = |looks| top(self.of_each_cause(looks), MOST_RIVALS);
+                    let chosen = |looks| self.with_others_of_edges(*own, top(self.of_each_cause(looks), MOST_RIVALS));
                     let stage = format!("rivals of {}", self.id(*own));
                     all.extend(self.replacements(best, member, chosen, &stage));
                 }

@@ -56,8 +56,12 @@ fn coarse_steps_are_fewer_and_change_less_than_any_sensor_shows() {
             (rows, plant.steps_taken())
         };
         let ((fine, many), (coarse, few)) = (run(Pace::Fine), run(Pace::Coarse));
-        // two intervals of a period have a step each whatever the pace
-        assert!(few < many || p.load.cpl_time_constant > 0.0, "{name}: {few} of {many}");
+        // a lag of 3 us and an input filter of 3 us are faster than the filter of 45 us, and ask for their steps whatever its own are
+        let is_of_others = p.load.cpl_time_constant > 0.0 || p.source.c_in > 0.0;
+        assert!(
+            if is_of_others { few == many } else { few < many },
+            "{name}: {few} of {many}"
+        );
         for channel in 0..2 {
             let of = |rows: &[[f64; 2]]| rows.iter().map(|row| row[channel]).collect::<Vec<_>>();
             let (fine, coarse) = (of(&fine), of(&coarse));

@@ -84,6 +84,15 @@ fn of_count(count: f64) -> f64 {
     if count < FEW { 1.0 + UNSURE / count.sqrt() } else { 1.0 }
 }
 
+/// Root of the count of second differences over the 5 % point of chi-square with as many degrees of freedom: noise is smaller than so many times what one,
+/// two ... of them show in nineteen tables of twenty. One alone is next to nothing by chance.
+const DIFFERENCES: [f64; 4] = [15.95, 4.41, 2.92, 2.37];
+
+fn of_differences(count: usize) -> f64 {
+    let known = DIFFERENCES.get(count.saturating_sub(1)).copied();
+    known.unwrap_or_else(|| of_count(count as f64 + 2.0))
+}
+
 /// Noise of a channel of which a handful of points are known: no less than that of a good meter, and as much more as they scatter, up to
 /// what a poor one has.
 pub(super) fn of_fewest(problem: &Problem, residual: &[f64], n: usize, scale: f64) -> f64 {
@@ -91,8 +100,7 @@ pub(super) fn of_fewest(problem: &Problem, residual: &[f64], n: usize, scale: f6
     let shown = |index: usize| {
         let values = channel(problem, residual, index, n).into_iter();
         let values: Vec<f64> = values.filter(|v| *v != 0.0).collect();
-        let second = scatter_of(&values);
-        second * problem.sigma[n] * of_count(values.len() as f64)
+        scatter_of(&values) * problem.sigma[n] * of_differences(values.len().saturating_sub(2))
     };
     let most = of_meter(problem, n, scale).max(least);
     let seen = (0..problem.records.len()).map(shown).filter(|seen| seen.is_finite());

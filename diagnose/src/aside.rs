@@ -62,11 +62,13 @@ impl Part {
         }
     }
 
-    /// Said where the model explains all but this part.
+    /// What it is called in a sentence.
     #[must_use]
-    pub fn alone(self, problem: &Problem) -> String {
-        let name = self.name(problem);
-        format!("without {name} the model as given explains the records: look at what was different in {name}")
+    pub fn said(self, problem: &Problem) -> String {
+        match self {
+            Part::Channel(_) => self.name(problem).to_owned(),
+            Part::Record(_) => format!("the record {}", self.name(problem)),
+        }
     }
 
     fn holds(self, record: usize, channel: usize) -> bool {
@@ -283,19 +285,21 @@ fn helps(pair: &Pair, found: &Examined) -> bool {
 /// Whether what was set aside bears the causes, and shows nothing that the converter does and its instruments do not.
 fn is_borne(found: &Examined, part: Part, whole: &Problem, records: &[Record], base: &Model) -> bool {
     let [before, after] = squares(found, part, whole, records, base);
-    after <= WORSE * before && !is_kicked(found, part, whole)
-}
-
-/// Whether the channel that was set aside swings as the filter does: no instrument does, and the other channels are of the same converter.
-fn is_kicked(found: &Examined, part: Part, whole: &Problem) -> bool {
-    let Part::Channel(n) = part else { return false };
+    let Part::Channel(n) = part else {
+        return after <= WORSE * before;
+    };
     let (problem, null, state) = with_channel(found, whole, n);
     let left = structures(&problem, &null, &state, found.attribution.inflation);
-    let mut kicked = (0..problem.records.len()).filter(|index| {
-        let is_left = |one: &Structure| (one.channel, &one.record) == (CHANNEL_NAMES[n], &problem.records[*index].name);
-        left.iter().any(is_left) && shape::is_kicked(&problem, &state, (*index, n))
-    });
-    kicked.any(|index| !shape::is_missing_elsewhere(&problem, &state, (index, n)))
+    let is_left = |index: &usize| {
+        let (channel, record) = (CHANNEL_NAMES[n], &problem.records[*index].name);
+        left.iter().any(|one| (one.channel, &one.record) == (channel, record))
+    };
+    let is_instrument = |index: &usize| shape::is_missing_elsewhere(&problem, &state, (*index, n));
+    let all: Vec<usize> = (0..problem.records.len()).filter(is_left).collect();
+    // no instrument swings as the filter does, and the other channels are of the same converter; one that sticks lacks the swing that a cause makes
+    let is_kicked = |index: &usize| shape::is_kicked(&problem, &state, (*index, n)) && !is_instrument(index);
+    let is_of_instrument = !all.is_empty() && all.iter().all(is_instrument);
+    (after <= WORSE * before || is_of_instrument) && !all.iter().any(is_kicked)
 }
 
 /// Sums of squares of what was set aside, without and with the causes.

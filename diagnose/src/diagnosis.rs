@@ -170,9 +170,8 @@ pub fn diagnose_knowing(
 /// that is a note.
 fn put_aside(mut rest: aside::Rest, found: &mut Examined, pair: &mut Option<Pair>) -> Option<(aside::Part, Problem)> {
     if rest.found.named.is_empty() {
-        found.odd.push(rest.part.alone(&found.problem));
         // what stands for edges may be all that another cause does to the channels that are left
-        found.odd.extend(words::edges(&rest.found));
+        found.all_but = Some((rest.part.said(&found.problem), words::edges(&rest.found)));
         return None;
     }
     rest.found.read_before(found);
@@ -289,12 +288,16 @@ fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<Str
     let mut near = String::new();
     if !explained && !found.is_misread() {
         odd.extend(other_carrier(problem, attribution));
-        near = nearest(
-            &found.named,
-            attribution.removed(problem),
-            found.fits_training_alone(),
-            &found.structure,
-        ) + &other_carrier_said(found);
+        // causes that bend to what one part of the records shows come near nothing
+        if found.all_but.is_none() {
+            near = nearest(
+                &found.named,
+                attribution.removed(problem),
+                found.fits_training_alone(),
+                &found.structure,
+            );
+        }
+        near += &other_carrier_said(found);
     }
     odd.extend(notes(found, pair));
     let mut causes = if explained { found.named.clone() } else { Vec::new() };

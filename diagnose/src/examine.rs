@@ -49,6 +49,8 @@ pub struct Examined {
     pub outliers: Vec<Outlier>,
     /// What was seen before any fit.
     pub odd: Vec<String>,
+    /// The channel or record without which the model as given explains the records, and what its edges do beside it.
+    pub all_but: Option<(String, Option<String>)>,
     /// The answer.
     pub verdict: Verdict,
 }
@@ -135,6 +137,7 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
         doubts,
         outliers,
         odd,
+        all_but: None,
     }
 }
 
@@ -178,6 +181,7 @@ impl Examined {
             lines: Vec::new(),
             outliers,
             odd: Vec::new(),
+            all_but: None,
         }
     }
 

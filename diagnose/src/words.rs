@@ -51,6 +51,14 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>, left:
                 doubts::said(doubts).iter().map(|doubt| format!("; {doubt}")).collect()
             };
             let (bench, others) = (said(&bench), said(&others));
+            if let Some((part, edges)) = &found.all_but {
+                let edges = edges
+                    .as_ref()
+                    .map_or(String::new(), |edges| format!(", with one thing beside it. {edges}"));
+                return format!(
+                    "Without {part} the model as given explains the records{edges}. No known cause explains {part}{bench}{left}{others}."
+                );
+            }
             format!("None of the known causes explains the records{bench}{left}{others}.")
         }
         Verdict::Consistent if !found.lines.is_empty() => {

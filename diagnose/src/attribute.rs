@@ -53,11 +53,21 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
     let candidates = sought(&problem);
     let basis = problem.basis(&null.model, &null.starts, &null.residual);
     let begun_at = problem.work.rows();
-    let singles = searcher(&problem, &candidates, &basis, &null, say).singles("each cause alone");
-    problem.work.singles_are_done(begun_at);
-    let read = in_front::read(&problem, &null, &candidates, &singles, say);
-    let (problem, null, singles) = read.unwrap_or((problem, null, singles));
     let search = searcher(&problem, &candidates, &basis, &null, say);
+    let singles = search.singles("each cause alone");
+    problem.work.singles_are_done(begun_at);
+    let (read, mut known) = (in_front::read(&search, &singles), search.known);
+    let (problem, null, singles) = match read {
+        Some(read) => {
+            known = Known::default();
+            read
+        }
+        None => (problem, null, singles),
+    };
+    let search = Searcher {
+        known,
+        ..searcher(&problem, &candidates, &basis, &null, say)
+    };
     let Some(inside) = Inside::needed(&search, &singles) else {
         let found = search.grow(&singles);
         let attribution = completed(&search, singles, found);

@@ -12,10 +12,10 @@ use plant::Parameters;
 
 use crate::attribute::searcher;
 use crate::causes::Candidate;
-use crate::fit::{Fit, State};
+use crate::fit::{Fit, Fitter, State};
 use crate::noise;
 use crate::problem::Problem;
-use crate::progress::{Listener, Progress};
+use crate::progress::Progress;
 use crate::record::{CHANNEL_NAMES, V_IN};
 use crate::search::Searcher;
 use crate::shape::structures;
@@ -32,23 +32,28 @@ pub const SAID: &str = "v_in stands still where the converter's input would drop
                         supply. A plant file's simulation shows v_in at the converter's input";
 
 /// The problem and the model as given with the other reading, and the single causes there, if it is needed.
-pub(crate) fn read(
-    problem: &Problem,
-    null: &State,
-    candidates: &[Candidate],
-    singles: &[Fit],
-    say: Listener<'_>,
-) -> Option<(Problem, State, Vec<Fit>)> {
+pub(crate) fn read(search: &Searcher<'_>, singles: &[Fit]) -> Option<(Problem, State, Vec<Fit>)> {
+    let Fitter {
+        problem,
+        candidates,
+        basis,
+        null,
+        ..
+    } = search.fitter;
     if !may_be(problem, null, candidates) {
         return None;
     }
-    let basis = problem.basis(&null.model, &null.starts, &null.residual);
-    let search = searcher(problem, candidates, &basis, null, say);
     let best = singles.iter().min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2))?;
-    if left(&search, best).is_empty() {
+    if left(search, best).is_empty() {
         return None;
     }
-    say(Progress::Stage("a source behind where v_in is measured"));
+    let count = problem.count() as f64;
+    let is_far_below = |chi2: f64| chi2 - count < LEFT * (best.state.chi2 - count);
+    // what two causes leave as little of is theirs
+    if search.pairs().iter().any(|fit| is_far_below(fit.state.chi2)) {
+        return None;
+    }
+    (search.say)(Progress::Stage("a source behind where v_in is measured"));
     let mut problem = problem.clone();
     let mut null = null.clone();
     (problem.base.v_in_in_front, null.model.v_in_in_front) = (true, true);
@@ -56,10 +61,9 @@ pub(crate) fn read(
         .filter(|n| candidates[*n].cause.id == CAUSE)
         .collect();
     let forms: Vec<Candidate> = places.iter().map(|n| candidates[*n].clone()).collect();
-    let fits = searcher(&problem, &forms, &basis, &null, say).singles("a source behind where v_in is measured");
+    let fits = searcher(&problem, &forms, basis, &null, search.say).singles("a source behind where v_in is measured");
     let least = fits.iter().map(|fit| fit.state.chi2).fold(f64::INFINITY, f64::min);
-    let count = problem.count() as f64;
-    if least - count > LEFT * (best.state.chi2 - count) {
+    if !is_far_below(least) {
         return None;
     }
     let mut singles = singles.to_vec();

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::attribute::{Attribution, searcher};
-use crate::causes::{Kind, Knob};
+use crate::causes::Kind;
 use crate::doubts;
 use crate::fit::{Fit, State};
 use crate::problem::Problem;
@@ -64,7 +64,7 @@ fn interval(attribution: &Attribution, fit: &Fit, number: usize, [low, high, _]:
 }
 
 /// Among explanations of as many causes that the data cannot put in order the most usual one leads, of these the one with the fewest numbers:
-/// copper and diode before the gain of a probe and a counter of few counts. What it replaces becomes its rival. One that ends at the limit of
+/// copper and diode before the gain of a probe and a counter of few counts, one conductance before a gain for each resistor. What it replaces becomes its rival. One that ends at the limit of
 /// what is tried leads nothing that another explains as well: it is no explanation, and no rival either.
 pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution, say: Listener<'_>) {
     let crossed = crossed(problem, attribution, say);
@@ -75,14 +75,19 @@ pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution, say: L
     let own = attribution.least_usual_first(best);
     let is_out = |of: &[Usual]| of.first().is_some_and(|least| least.is_at_bound);
     // a rival lies within a tie, whatever one gains that may not go on
-    let worst = match is_out(&own) {
+    let price = libm::log(problem.count() as f64);
+    // a number less is worth what the search asks for a number more
+    let worst = |fit: &Fit| match is_out(&own) {
         true => f64::INFINITY,
-        false => best.state.chi2 + LEVEL * attribution.inflation,
+        false => {
+            let fewer = best.values.len().saturating_sub(fit.values.len()) as f64;
+            best.state.chi2 + LEVEL * attribution.inflation + price * fewer
+        }
     };
     let leads = |(fit, usual): &(&Fit, Vec<Usual>)| {
         fit.causes.len() == best.causes.len()
-            && *usual < own
-            && fit.state.chi2 <= worst
+            && (usual, fit.values.len()) < (&own, best.values.len())
+            && fit.state.chi2 <= worst(fit)
             && structures(problem, &attribution.null, &fit.state, attribution.inflation).is_empty()
     };
     let all = attribution.rivals.iter().flatten();
@@ -165,10 +170,6 @@ fn crossed(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> V
     fits.into_iter().filter(leads).collect()
 }
 
-/// A number so many times as large as any that is typical is none of this part: a diode of an ohm where a tenth is much. Data sheets
-/// differ by less, and converters of 400 V have other resistances than those of 5 V.
-const UNTYPICAL: f64 = 5.0;
-
 /// Rivals of each place that are tried in two places at once, the most usual ones. A convention: each pair of them costs a fit.
 const CROSSED: usize = 2;
 
@@ -193,15 +194,10 @@ impl Attribution {
             .take(candidate.own.len())
             .copied()
             .collect();
-        let mut own = values.iter().zip(&candidate.own).zip(candidate.form.knobs);
-        let is_untypical = |((value, model), knob): ((&f64, &f64), &Knob)| {
-            let parameter = knob.keys.first().and_then(|key| plant::parameter(key));
-            let most = parameter.map_or(f64::INFINITY, |parameter| parameter.typical.1.abs());
-            value.abs() > UNTYPICAL * most.max(model.abs())
-        };
+        let mut own = (values.iter().zip(&candidate.own)).zip(candidate.form.knobs.iter().zip(&candidate.ranges));
         Usual {
             is_at_bound: doubts::is_at_bound(candidate, &values),
-            is_untypical: own.any(is_untypical),
+            is_untypical: own.any(|((value, model), (knob, range))| knob.is_untypical(*value, *model, range)),
             kind: candidate.cause.kind,
         }
     }

@@ -88,6 +88,12 @@ pub struct Knob {
     pub(super) is_lag: bool,
 }
 
+/// A number so many times as large as any that is typical is none of this part: a diode of an ohm where a tenth is much. Data sheets
+/// differ by less, and converters of 400 V have other resistances than those of 5 V.
+const UNTYPICAL: f64 = 5.0;
+/// Share of the largest conductance that is tried which is nothing odd: a tenth of the load. A convention.
+const USUAL_OF_LOAD: f64 = 1.0 / 3.0;
+
 impl Knob {
     /// One that moves within `[low, high, step]`, whatever the converter's size.
     pub(crate) const fn plain(name: &'static str, keys: &'static [&'static str], [low, high, step]: [f64; 3]) -> Self {
@@ -132,6 +138,19 @@ impl Knob {
     #[must_use]
     pub fn is_share(&self) -> bool {
         matches!(self.reach, Reach::Share(..))
+    }
+
+    /// Whether a value is far above what is typical, and above the model's own; of a range that [`Knob::range`] gave.
+    #[must_use]
+    pub(crate) fn is_untypical(&self, value: f64, model: f64, [_, high, _]: &[f64; 3]) -> bool {
+        let parameter = self.keys.first().and_then(|key| plant::parameter(key));
+        let most = parameter.map_or(f64::INFINITY, |parameter| parameter.typical.1.abs());
+        // of a load that is drawn beside the set one its share counts, whatever the converter's size
+        let of_load = match self.reach {
+            Reach::Conductance(..) => USUAL_OF_LOAD * high,
+            _ => 0.0,
+        };
+        value.abs() > (UNTYPICAL * most.max(model.abs())).max(of_load)
     }
 
     /// SI unit.

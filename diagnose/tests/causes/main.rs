@@ -64,6 +64,27 @@ fn resistors_that_are_each_off_by_something_else_are_named_beside_a_winding() {
     }
 }
 
+/// A gain for each resistor does the same with three numbers; milliohms and millisiemens that are much for a small converter are little for a large one.
+#[test]
+fn a_conductance_beside_all_resistors_leads_before_a_gain_for_each() {
+    for seed in [71, 72, 73, 74] {
+        let mut d = drawn(seed);
+        let mut resistors = d.resistors();
+        let beside = 0.03 * d.g;
+        resistors.off = resistors.g.map(|g| beside / g);
+        let findings = found(&mut d, &resistors, &ALL);
+        println!("{seed}: {} S: {}", beside, findings.sentence);
+        let first = findings.causes.first().map(|cause| cause.id);
+        assert_eq!(
+            (first, findings.causes.len()),
+            (Some("bleed"), 1),
+            "{}",
+            findings.sentence
+        );
+        is_near(&findings, "bleed", "bleed", beside, 0.02);
+    }
+}
+
 #[test]
 fn a_core_that_saturates_at_once_is_named() {
     for seed in [21, 22] {

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use crate::independent::families::SHOWS;
 use crate::independent::intervals::{self, Told};
-use crate::independent::truth::{Family, Truth};
+use crate::independent::truth::{Family, Hidden, Reducible, Truth};
 
 /// A held-out column counts for the gain from this share of reducible error to noise on.
 const WORTH: f64 = 0.3;
@@ -262,7 +262,7 @@ fn untold(truth: &Truth, causes: &[Named]) -> bool {
     truth.family == Family::Cause && !causes.iter().any(told)
 }
 
-/// Shares of the reducible error removed in held-out columns that have some.
+/// Shares of the reducible error removed in held-out columns that have some; not in one that something on no list disturbs, which no model takes away.
 fn removed(truth: &Truth, diagnosis: &Value) -> Vec<f64> {
     let lines = diagnosis["gain"]["heldout"].as_array().cloned().unwrap_or_default();
     let mut shares = Vec::new();
@@ -282,7 +282,11 @@ fn removed(truth: &Truth, diagnosis: &Value) -> Vec<f64> {
             .records
             .iter()
             .find(|of| of.record == stem && of.channel == channel);
-        let Some(of) = of.filter(|of| of.reducible > WORTH * of.floor) else {
+        let is_disturbed = |of: &&Reducible| {
+            let of_it = |hidden: &Hidden| !hidden.listed && hidden.channel.as_ref() == Some(&of.channel);
+            truth.hidden.iter().any(of_it)
+        };
+        let Some(of) = of.filter(|of| of.reducible > WORTH * of.floor && !is_disturbed(of)) else {
             continue;
         };
         if let (Some(before), Some(after)) = (line["rmse_before"].as_f64(), line["rmse_after"].as_f64()) {

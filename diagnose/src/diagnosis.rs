@@ -239,14 +239,15 @@ fn read_off(problem: &Problem, model: &Parameters) -> Vec<Estimates> {
     problem.records.iter().filter_map(of).collect()
 }
 
-/// Whether something is left that a term could describe. Causes that leave only noise leave nothing, whatever speaks against them: a term would imitate
-/// them. Nor does a channel that was set aside: what corrects the duty moves the others, which need nothing.
+/// Whether something is left that a term could describe: of the model as given, since nothing is believed that causes leave nothing of. Not where the
+/// held-out records alone speak against them, which would refute a term as well. Nor of a channel that was set aside: what corrects the duty moves the
+/// others, which need nothing.
 fn asks_for_a_term(found: &Examined, explained: bool, aside: Option<&Aside>) -> bool {
     let is_to_describe = match aside {
         None => !explained,
         Some(aside) => aside.channel.is_none(),
     };
-    is_to_describe && !found.structure.is_empty() && found.is_of_a_converter()
+    is_to_describe && !found.left().is_empty() && !found.fits_training_alone() && found.is_of_a_converter()
 }
 
 /// The term that describes what `model`, with its trim, leaves; model and held-out records follow it where it is written.

@@ -160,3 +160,21 @@ fn a_tie_beside_load_steps_inside_periods_has_every_member() {
         findings.sentence
     );
 }
+
+/// A real converter of 24 V that remembers, of a data set of SysIdentPy (LICENSE in its folder), held against a model whose numbers are guesses. Causes leave
+/// nothing of it but a doubt, so that none is believed; a tuned black box reaches 0.44 V where nothing is fed back.
+#[test]
+fn a_converter_that_no_believed_cause_explains_is_described() {
+    let findings = findings("hysteresis", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::Unexplained, "{}", findings.sentence);
+    assert!(
+        findings.causes.is_empty() && !findings.doubts.is_empty(),
+        "{:?}",
+        findings.doubts
+    );
+    let term = findings.empirical.as_ref().unwrap();
+    assert!(term.written, "{}", term.sentence);
+    let mut held = findings.gain.heldout.iter();
+    let after = held.find(|held| held.channel == "v_o").unwrap().rmse_after;
+    assert!(after < 0.44, "{after} V");
+}

@@ -100,8 +100,8 @@ pub fn diagnose_knowing(
     let explained = found.verdict != Verdict::Unexplained;
     let (state, trim) = better(&found, model.converter.f_sw);
     let mut answer = answer(&found, pair.as_ref(), &state, sources, say);
-    // the figures are those of the file that is written
-    if !explained {
+    // the figures are those of the file that is written, whose edges do what the records tell from nothing
+    if !explained || !has_trim(&found, trim, model.converter.f_sw) {
         pair = held(&found.problem, heldout, &base, &state, trim);
     }
     let mut whole_problem = None;
@@ -196,6 +196,11 @@ fn better(found: &Examined, f_sw: f64) -> (State, f64) {
             (state, trim)
         }
     }
+}
+
+/// Whether the held-out records were judged with the trim that is written.
+fn has_trim(found: &Examined, written: f64, f_sw: f64) -> bool {
+    written != 0.0 || found.attribution.state().starts.trim_or_none(f_sw) == 0.0
 }
 
 /// Whether the records tell a trim of the edges from none: two standard deviations.

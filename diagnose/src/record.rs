@@ -6,6 +6,7 @@ mod channels;
 mod clipped;
 mod digits;
 pub(crate) mod edges;
+mod exchanged;
 mod levels;
 mod logged;
 mod raw;

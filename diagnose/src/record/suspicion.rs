@@ -3,11 +3,12 @@
 use plant::{Load, Parameters, Rectifier, Topology};
 use toml_input::Message;
 
-use super::Record;
 use super::channels::{CHANNEL_UNITS, CHANNELS, QUANTITIES};
+use super::exchanged;
 use super::source::Source;
 use super::steady::{self, Beside};
 use super::still;
+use super::{Record, V_IN};
 use crate::ideal::{self, Ideal};
 use crate::median::median;
 
@@ -60,6 +61,9 @@ pub fn of(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]
     }
     let labels: [&str; CHANNELS] = std::array::from_fn(|n| sources[n].label.as_str());
     let mut odd = sized(record, parameters, &labels);
+    if odd.is_empty() {
+        odd = exchanged_voltages(record, parameters, sources);
+    }
     if odd.is_empty() && !duty.stated {
         odd = other_duty(record, parameters, &duty.header);
     }
@@ -73,6 +77,28 @@ pub fn of(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]
         odd = probes(record, parameters, sources);
     }
     odd
+}
+
+/// The two voltages in each other's columns.
+fn exchanged_voltages(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]) -> Vec<Message> {
+    let [output, source] = [&sources[0], &sources[V_IN]];
+    let is_stated = output.stated || source.stated;
+    if is_stated || !exchanged::voltages(record, &Ideal::of(record, parameters)) {
+        return Vec::new();
+    }
+    let [v_out, v_in] = [QUANTITIES[0], QUANTITIES[V_IN]];
+    let map = measured::argument(&format!("{v_out}={},{v_in}={}", source.header, output.header));
+    let [output_label, source_label] = [&output.label, &source.label];
+    vec![
+        Message::new(format!("the columns {output_label} and {source_label} look exchanged"))
+            .found(format!(
+                "{output_label} stands still at the source's voltage, and {source_label} goes with the duty"
+            ))
+            .hint(format!(
+                "name them the right way in the header, or by a map: {map}; if they are right: {}",
+                mapped(0, output, 1.0)
+            )),
+    ]
 }
 
 /// Signals on the wrong side of 0.

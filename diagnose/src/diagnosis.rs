@@ -166,8 +166,8 @@ pub fn diagnose_knowing(
     }
 }
 
-/// Makes an explanation of all but a part the answer; the part, and the problem with it. Where the model as given explains the rest,
-/// that is a note.
+/// Makes an explanation of all but a part the answer; the part, and the problem with it. Where the model as given explains the rest, that is said first,
+/// and there is no cause.
 fn put_aside(mut rest: aside::Rest, found: &mut Examined, pair: &mut Option<Pair>) -> Option<(aside::Part, Problem)> {
     if rest.found.named.is_empty() {
         // what stands for edges may be all that another cause does to the channels that are left

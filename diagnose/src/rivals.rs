@@ -64,8 +64,9 @@ fn interval(attribution: &Attribution, fit: &Fit, number: usize, [low, high, _]:
 }
 
 /// Among explanations of as many causes that the data cannot put in order the most usual one leads, of these the one with the fewest numbers:
-/// copper and diode before the gain of a probe and a counter of few counts, one conductance before a gain for each resistor. What it replaces becomes its rival. One that ends at the limit of
-/// what is tried leads nothing that another explains as well: it is no explanation, and no rival either.
+/// copper and diode before the gain of a probe and a counter of few counts, one conductance before a gain for each resistor. What it replaces
+/// becomes its rival. One that ends at the limit of what is tried leads nothing that another explains as well: it is no explanation, and no rival
+/// either.
 pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution, say: Listener<'_>) {
     let crossed = crossed(problem, attribution, say);
     for (member, fit) in crossed {
@@ -74,9 +75,8 @@ pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution, say: L
     let Some(best) = &attribution.best else { return };
     let own = attribution.least_usual_first(best);
     let is_out = |of: &[Usual]| of.first().is_some_and(|least| least.is_at_bound);
-    // a rival lies within a tie, whatever one gains that may not go on
     let price = libm::log(problem.count() as f64);
-    // a number less is worth what the search asks for a number more
+    // a rival lies within a tie, whatever one gains that may not go on; a number less is worth what the search asks for a number more
     let worst = |fit: &Fit| match is_out(&own) {
         true => f64::INFINITY,
         false => {

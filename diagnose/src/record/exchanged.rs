@@ -4,12 +4,12 @@ use super::{Record, V_IN};
 use crate::ideal::Ideal;
 use crate::median::median;
 
-/// Exchanged, each voltage is this near to its own, as a share of the source: losses of a tenth. And as far from it as they stand, whatever
-/// losses do.
+/// Read the other way round, each voltage is this near to what the model has, as a share of the source; as they stand, each is farther. Losses are less
+/// than a tenth.
 const NEAR: f64 = 0.1;
-/// As they stand they are off by this many times as much.
+/// As they stand they are off by this many times as much. A convention: of two readings the clearly nearer one.
 const CLEARLY: f64 = 3.0;
-/// The duty moves by as much at least: at one duty the source may be another one.
+/// The duty moves by as much at least: at one duty the source may be another one. A convention.
 const MOVES: f64 = 0.05;
 
 /// Whether `v_in` goes with the duty as an output voltage does, and `v_out` stands still as the source.

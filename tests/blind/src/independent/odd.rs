@@ -79,7 +79,8 @@ fn materials(id: &str, x: f64, design: &Design, board: &mut Board, random: &mut 
             board.stage.r_winding += 0.01 * design.r_load();
             board.odd.heating = (0.6 * x, tau);
             let what = format!("copper warms by {:.0} % within {:.3} ms", 60.0 * x, 1e3 * tau);
-            Some((what, &[]))
+            // the winding is larger before it warms, and that is all there is where little current flows
+            Some((what, &["dcr"]))
         }
         "hysteresis" => {
             board.odd.hysteresis = 0.03 * x * design.i_l();

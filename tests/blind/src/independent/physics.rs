@@ -144,29 +144,25 @@ fn a_buck_falls_by_its_resistances_and_its_lost_duty() {
     assert!((v - (0.38 * 24.0 - 0.62 * 0.7)).abs() < 1e-4, "{v}");
 }
 
-/// The node falls along a ramp while the inductor discharges it, unless a switch pulls it down.
+/// The node falls along a ramp from the source's voltage to the diode's, while the inductor discharges it, unless a switch pulls it down.
 #[test]
 fn capacitance_of_the_node_adds_half_its_fall_to_the_duty() {
-    let volts = |synchronous| {
-        let mut board = ideal(Topology::Buck);
-        (board.stage.synchronous, board.stage.l, board.gates.node) = (synchronous, 2.2e-3, 20e-9);
-        mean(
-            &settled(
-                &board,
-                0.4,
-                Load {
-                    i: 2.0,
-                    ..Load::default()
-                },
-                400,
-            ),
-            |n| n.v_out,
-        )
+    let load = Load {
+        i: 2.0,
+        ..Load::default()
     };
-    let fall = 20e-9 * 24.0 / 2.0;
-    let v = 24.0 * (0.4 + 0.5 * fall * 100e3);
-    assert!((volts(false) - v).abs() < 0.03, "{} {v}", volts(false));
-    assert!((volts(true) - 9.6).abs() < 1e-3, "{}", volts(true));
+    let volts = |synchronous, v_f| {
+        let mut board = ideal(Topology::Buck);
+        (board.stage.synchronous, board.stage.v_f) = (synchronous, v_f);
+        (board.stage.l, board.gates.node) = (2.2e-3, 20e-9);
+        mean(&settled(&board, 0.4, load, 400), |n| n.v_out)
+    };
+    for v_f in [0.0, 2.0] {
+        let fall = 20e-9 * (24.0 + v_f) / 2.0;
+        let v = 24.0 * 0.4 - 0.6 * v_f + 0.5 * fall * 100e3 * (24.0 + v_f);
+        assert!((volts(false, v_f) - v).abs() < 0.03, "{} {v}", volts(false, v_f));
+    }
+    assert!((volts(true, 0.0) - 9.6).abs() < 1e-3, "{}", volts(true, 0.0));
 }
 
 #[test]

@@ -128,7 +128,9 @@ impl Walk<'_> {
             return Path::Main;
         }
         if self.was == Path::Main && g.node > 0.0 && i > 0.0 {
-            self.node = self.board.source.v;
+            // from where the main switch held it to where the diode will
+            let stage = &self.board.stage;
+            self.node = self.board.source.v + stage.v_f + (stage.r_d - stage.r_main) * i;
         }
         let path = match (second, i) {
             (true, _) => Path::Second,

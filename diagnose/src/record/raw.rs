@@ -5,7 +5,7 @@ use plant::Load;
 use toml_input::{Fault, Faults, Message, Sink};
 
 use super::channels::QUANTITIES;
-use super::digits::{last_digit, lattice};
+use super::digits::{lattice, rounding};
 use super::source::Source;
 use super::unread::Unread;
 
@@ -266,9 +266,9 @@ impl<'a> Raw<'a> {
         self.of_column(name, lattice)
     }
 
-    /// The last digit written of a channel.
+    /// What the numbers of a channel are rounded to.
     pub fn resolution(&self, name: &str) -> f64 {
-        self.of_column(name, |_, decimals| last_digit(decimals))
+        self.of_column(name, rounding)
     }
 
     /// A length that is read off the numbers as they are written, in SI.

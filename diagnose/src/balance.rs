@@ -70,6 +70,61 @@ fn of(problem: &Problem, record: &Record) -> Option<String> {
     ))
 }
 
+/// What one wrong point leaves of an error goes without it: to a quarter at most. Of points that are of no such form none takes as much with it.
+const OF_ONE: f64 = 0.25;
+
+/// Leaves out the voltage of the one settled point without which all others are of the form, and says so; `usual` is the usual voltage. A number that
+/// is mistyped is off by more than any meter, and no cause makes it.
+pub(crate) fn leave_out_odd(problem: &mut Problem) {
+    let (plant, usual) = (&problem.base.plant, problem.bases.v);
+    for record in problem.records.iter_mut().filter(|record| record.settled) {
+        let ideal = Ideal::of(record, plant);
+        leave_out_odd_of(record, &ideal, usual);
+    }
+}
+
+fn leave_out_odd_of(record: &mut Record, ideal: &Ideal, usual: f64) {
+    // the current that a wrong voltage would draw is wrong as well, and a point by itself out there bends the others to it
+    let at = |row: usize| Some((row, point(ideal, record, row, ideal.volts(record.duty[row]))?));
+    let (rows, points): (Vec<usize>, Vec<Point>) = (0..record.rows()).filter_map(at).unzip();
+    let v: Vec<f64> = points.iter().map(|p| p.0).collect();
+    let own = columns(ideal.topology, &points);
+    let free = points.len().saturating_sub(own.len());
+    if points.len() > ASKED || free <= MORE {
+        return;
+    }
+    let rms = (left(&own, &v) / free as f64).sqrt();
+    let without = |place: usize| {
+        let mut others = points.clone();
+        others.remove(place);
+        let v: Vec<f64> = others.iter().map(|p| p.0).collect();
+        let left = left(&columns(ideal.topology, &others), &v);
+        ((left / (free - 1) as f64).sqrt(), place)
+    };
+    let least = (0..points.len()).map(without).min_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((least, place)) = least.filter(|(least, _)| *least < OF_ONE * rms && *least < LEFT * usual) else {
+        return;
+    };
+    // with a term for it alone, its weight is what it is off by
+    let mut own = own;
+    own.push((0..points.len()).map(|n| if n == place { 1.0 } else { 0.0 }).collect());
+    let above = weights(&own, &v).last().copied().unwrap_or(f64::NAN);
+    if above.abs() < LEFT * usual || above.abs() < SURELY * least {
+        return;
+    }
+    let (v, duty, i) = points[place];
+    let [v, i, by] = [(v, "V"), (i, "A"), (above.abs(), "V")].map(|(value, unit)| crate::words::si(value, unit));
+    record.repairs.push(format!(
+        "v_o at a duty of {duty} and a load of {i} is {v}, {by} {} what all other points say: left out. Is it mistyped, or was the converter not at \
+         rest?",
+        if above > 0.0 { "above" } else { "below" }
+    ));
+    record.measured[0][rows[place]] = f64::NAN;
+}
+
+/// Standard deviations of the others by which a point is surely off: the largest of 64 is 3.5 beside the rest once in thirty tables, 6 once in a million.
+const SURELY: f64 = 10.0;
+
 /// Counts of a period that are tried, as multiples of those whose rounding scatters the voltage by as much as the points are beside.
 const AROUND: [f64; 2] = [0.5, 2.0];
 /// How far apart they are: half of that moves a duty by a hundredth of a count at most, so that of a table hardly one is rounded otherwise.
@@ -139,21 +194,38 @@ pub(crate) fn least_of_counters(
     Some((least, tries))
 }
 
-/// A row as a point, where the current never rests.
-fn point(ideal: &Ideal, record: &Record, row: usize, v: f64) -> Option<Point> {
-    let (d, i) = (record.duty[row], ideal::drawn(&record.load[row], v));
+/// Least inductance of the bench over that of the model, as far as it decides which points are told: with half of it the ripple is twice as large, and
+/// the current behind a diode rests where the model's does not. A convention: an inductance that is further off is named from what moves.
+const LEAST_INDUCTANCE: f64 = 0.5;
+
+/// A row as a point, where the current never rests that its load draws at an output of `at`.
+fn point(ideal: &Ideal, record: &Record, row: usize, at: f64) -> Option<Point> {
+    let (v, d, i) = (
+        record.measured[0][row],
+        record.duty[row],
+        ideal::drawn(&record.load[row], at),
+    );
+    let surely = match ideal.may_rest() {
+        true => LEAST_INDUCTANCE,
+        false => 1.0,
+    };
     // at a duty of 1 the form of a boost has no value
-    (v.is_finite() && d < 1.0 && ideal.never_rests(i, d)).then_some((v, d, i))
+    (v.is_finite() && d < 1.0 && ideal.never_rests(surely * i, d)).then_some((v, d, i))
 }
 
-/// The sum of squares that the columns leave of some values.
-pub(crate) fn left(columns: &[Vec<f64>], values: &[f64]) -> f64 {
+/// What of each column is in some values.
+fn weights(columns: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
     let matrix: Vec<Vec<f64>> = columns
         .iter()
         .map(|a| columns.iter().map(|b| dot(a, b)).collect())
         .collect();
     let right: Vec<f64> = columns.iter().map(|a| dot(a, values)).collect();
-    let weights = solve(&matrix, &right);
+    solve(&matrix, &right)
+}
+
+/// The sum of squares that the columns leave of some values.
+pub(crate) fn left(columns: &[Vec<f64>], values: &[f64]) -> f64 {
+    let weights = weights(columns, values);
     let fitted = |n: usize| {
         let terms = columns.iter().zip(&weights);
         terms.map(|(column, weight)| column[n] * weight).sum::<f64>()

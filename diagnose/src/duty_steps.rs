@@ -52,6 +52,7 @@ pub(crate) fn likely(
         .iter()
         .enumerate()
         .flat_map(|(n, piece)| piece.within().map(move |counts| (n, counts)))
+        .filter(|(_, counts)| !goes_along(gains.levels(), *counts))
         .collect();
     let groups: Vec<&[(usize, f64)]> = tried.chunks(LANES).collect();
     let all = parallel::map(&groups, |group| {
@@ -67,7 +68,10 @@ pub(crate) fn likely(
     let mut ranked: Vec<((f64, f64), Piece)> = best.into_iter().zip(pieces).collect();
     // equal gains in the order of the counts, so that the same records give the same starts
     ranked.sort_by(|(a, one), (b, other)| b.0.total_cmp(&a.0).then(one.low.total_cmp(&other.low)));
-    let kept = ranked.iter().take(count);
+    let kept = ranked
+        .iter()
+        .filter(|((gain, _), _)| *gain > f64::NEG_INFINITY)
+        .take(count);
     kept.flat_map(|((_, best), piece)| piece.tried(*best)).collect()
 }
 
@@ -107,6 +111,45 @@ fn levels(problem: &Problem) -> Vec<(f64, f64)> {
         }
     }
     levels
+}
+
+/// Levels for each tooth of a sawtooth over the duties, from which on it is a bend: with six a parabola and a jump take most of a tooth.
+const OF_A_TOOTH: f64 = 6.0;
+/// Levels from which on that is said: errors of five bits at .3, .4 and .5 lie on a line as well.
+const FEWEST_LEVELS: usize = 8;
+
+/// Whether the rounding errors go along with the duty over the `levels`: a counter of nearly as many counts as the duties are written in beats with
+/// them, and its error is a slow sawtooth. That is a bend, which any loss might leave, and no sign of a counter.
+fn goes_along(levels: &[f64], counts: f64) -> bool {
+    let is_slow = |teeth: f64| OF_A_TOOTH * teeth < levels.len() as f64;
+    levels.len() >= FEWEST_LEVELS && teeth(levels, counts).is_some_and(is_slow)
+}
+
+/// Teeth of the beat of a counter with the decimals in which the `levels` are written, if they are written in few and it has as many counts or more.
+fn teeth(levels: &[f64], counts: f64) -> Option<f64> {
+    let is_whole = |unit: f64| {
+        (levels.iter()).all(|duty| (duty * unit - libm::round(duty * unit)).abs() < WHOLE * unit * duty.max(WHOLE))
+    };
+    let unit = (1..=DECIMALS)
+        .map(|digits| 10f64.powi(digits))
+        .find(|unit| is_whole(*unit))?;
+    let of_unit = counts / unit;
+    let beat = (of_unit - libm::round(of_unit)).abs();
+    let ends = levels
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], duty| {
+            [low.min(*duty), high.max(*duty)]
+        });
+    (libm::round(of_unit) >= 1.0).then_some(beat * (ends[1] - ends[0]) * unit)
+}
+
+/// Most decimals of a duty that a table is written with by plan.
+const DECIMALS: i32 = 4;
+
+/// Whether the rounding to so many counts is a bend over the duties of the records.
+pub(crate) fn is_bend(problem: &Problem, counts: f64) -> bool {
+    let levels: Vec<f64> = levels(problem).into_iter().map(|(duty, _)| duty).collect();
+    goes_along(&levels, counts)
 }
 
 /// A share of a count by which a duty in decimals may miss a whole one.
@@ -161,11 +204,28 @@ mod tests {
     use plant::Parameters;
 
     use super::responses::Circuit;
-    use super::{Cut, dot, levels, likely, rounded};
+    use super::{Cut, dot, goes_along, levels, likely, rounded};
     use crate::drive::Model;
     use crate::fit::State;
     use crate::problem::Problem;
     use crate::record::Record;
+
+    #[test]
+    fn a_counter_that_beats_with_the_decimals_of_the_duties_is_a_bend() {
+        let duties = [
+            280, 295, 303, 310, 323, 329, 348, 364, 373, 374, 376, 378, 380, 389, 402, 408, 422, 427, 435, 438, 439,
+            442, 445, 448, 451, 465, 476, 504, 507,
+        ]
+        .map(|duty| f64::from(duty) / 1000.0);
+        for counts in [996.0, 999.008, 1000.0, 1002.5, 1990.0] {
+            assert!(goes_along(&duties, counts), "{counts}");
+        }
+        // those that a table tells: a few bits, and a number that has nothing to do with the decimals
+        for counts in [33.0, 64.0, 128.0, 250.0, 256.0, 470.0, 720.0] {
+            assert!(!goes_along(&duties, counts), "{counts}");
+        }
+        assert!(!goes_along(&[0.3, 0.4, 0.5], 32.0));
+    }
 
     /// Three levels of the duty, 80 rows.
     fn problem(model: &Parameters) -> Problem {

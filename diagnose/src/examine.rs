@@ -1,6 +1,7 @@
 //! Training records to an answer, before any record judges it.
 
 use crate::attribute::{Attribution, attribute, without_search};
+use crate::balance;
 use crate::doubts::{self, Doubt};
 use crate::drive::Model;
 use crate::fast;
@@ -316,6 +317,7 @@ fn intervals(
 /// Noise estimated, outliers masked, initial states fitted.
 fn prepared(train: Vec<Record>, base: &Model, work: &Work) -> (Problem, State, Vec<Outlier>) {
     let mut problem = Problem::new(train, base.clone());
+    balance::leave_out_odd(&mut problem);
     problem.work = work.over(problem.records.iter().map(Record::rows).sum());
     let mut null = State::settle(&problem, base, &problem.first_starts(base), None);
     if sides::leave_out(&mut problem, &null) {

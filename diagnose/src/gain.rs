@@ -3,6 +3,7 @@
 use measured::DutyIs;
 use plant::Rectifier;
 
+use crate::balance;
 use crate::drive::Model;
 use crate::fit::State;
 use crate::ideal::{self, Ideal};
@@ -143,6 +144,7 @@ pub struct Pair {
 #[must_use]
 pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHANNELS], trim: f64) -> Pair {
     let mut problem = Problem::new(records.to_vec(), base.clone());
+    balance::leave_out_odd(&mut problem);
     // a channel that no training record has gets no weight
     problem.sigma = sigma.map(|s| if s.is_finite() { s } else { f64::INFINITY });
     // a trim that is fitted to a record that judges would flatter the model

@@ -72,7 +72,9 @@ pub fn against(pair: &Pair, training: &Problem, at: &State, found: &Of) -> Vec<D
         let channels = of_record.iter().map(|shift| shift.number).collect();
         Doubt::HeldOut(channels, not_there(of_record))
     });
-    of_records.chain(points(pair)).collect()
+    let spoilt = held_table::spoilt(pair).into_iter();
+    let spoilt = spoilt.map(|(channels, words)| Doubt::HeldOut(channels, words));
+    of_records.chain(points(pair)).chain(spoilt).collect()
 }
 
 /// What tables of settled points say against any model: an error that no meter makes.

@@ -180,6 +180,11 @@ impl Ideal {
         }
     }
 
+    /// Whether there is a diode, behind which the current may rest.
+    pub fn may_rest(&self) -> bool {
+        self.rests
+    }
+
     /// Whether the inductor current surely never rests: a voltage then follows from the duty alone.
     pub fn never_rests(&self, drawn: f64, duty: f64) -> bool {
         self.inductor(drawn, duty) > CONTINUOUS * self.half(duty)

@@ -93,11 +93,17 @@ pub fn chosen(
             .is_empty()
             .then_some((*number, fit, pair))
     });
-    let allowed = pairs.into_iter().flatten();
+    // to hold is more than to do no harm that is told
+    let is_better = |(_, _, pair): &(usize, Fit, Pair)| pair.total().1 < pair.total().0.max(NOISE_ALONE);
+    let allowed = pairs.into_iter().flatten().filter(is_better);
     let (number, fit, pair) = allowed.min_by(|a, b| a.2.total().1.total_cmp(&b.2.total().1))?;
     let words = words(&profiles[number], fit.values[number], cut(&number).is_some());
     Some(Chosen { fit, pair, words })
 }
+
+/// Mean square over that of the noise which held-out records may leave, whatever the model as given leaves of them: noise alone leaves as much in ten
+/// values once in ten tables.
+const NOISE_ALONE: f64 = 1.6;
 
 /// What to say of a chosen value.
 fn words(profile: &Profile, value: f64, is_step: bool) -> String {

@@ -114,7 +114,14 @@ impl Searcher<'_> {
 
     /// A duty counter near `counts` that fits better, and the chi-square expected with it.
     fn refined(&self, set: &Set<'_>, cause: usize, from: &State, counts: f64) -> (f64, Vec<f64>) {
+        let is_bend = |counts: f64| match self.search(cause) {
+            Search::Counter(_) => duty_steps::is_bend(self.fitter.problem, counts),
+            _ => false,
+        };
         let look = |counts: f64| {
+            if is_bend(counts) {
+                return f64::INFINITY;
+            }
             let mut left = self.fitter.state_at(&[cause], &[counts.recip()], from, 0).0.residual;
             self.fitter.basis.project(&mut left);
             dot(&left, &left) - gained(set.columns, &left)
@@ -161,13 +168,14 @@ impl Searcher<'_> {
     pub(super) fn counted(&self, fit: Fit, place: usize) -> Fit {
         let counts = fit.values[place].recip();
         let whole = libm::round(counts);
-        let tried = [
+        let mut tried = vec![
             whole,
             whole - 1.0,
             whole + 1.0,
             counts - COUNT_STEP,
             counts + COUNT_STEP,
         ];
+        tried.retain(|counts| !duty_steps::is_bend(self.fitter.problem, *counts));
         let fits = parallel::map(&tried, |counts| {
             let mut values = fit.values.clone();
             values[place] = counts.recip();

@@ -30,8 +30,8 @@ pub(crate) struct WithoutChannel {
 }
 
 impl WithoutChannel {
-    /// Fits the leaders among `singles` without channel `n`.
-    pub fn of(fitter: &Fitter<'_>, singles: &[Fit], n: usize) -> Self {
+    /// Fits the leaders among `singles` without channel `n`, and each cause of the set that is `best`.
+    pub fn of(fitter: &Fitter<'_>, singles: &[Fit], best: Option<&Fit>, n: usize) -> Self {
         let mut problem = fitter.problem.clone();
         for masked in &mut problem.masked {
             masked[n].fill(true);
@@ -44,9 +44,16 @@ impl WithoutChannel {
             null: &null,
             ..*fitter
         };
-        let fits = parallel::map(&leaders(&problem, singles, n), |fit| {
-            own.from(&fit.causes, &fit.values, &null)
-        });
+        let mut begun: Vec<(usize, Vec<f64>)> = (leaders(&problem, singles, n).into_iter())
+            .map(|fit| (fit.causes[0], fit.values.clone()))
+            .collect();
+        // where singles were not fitted again beside free instants, they say nothing of what leads there
+        for (cause, values) in best.map_or(Vec::new(), |best| members(&own, best)) {
+            if begun.iter().all(|(known, _)| *known != cause) {
+                begun.push((cause, values));
+            }
+        }
+        let fits = parallel::map(&begun, |(cause, values)| own.from(&[*cause], values, &null));
         WithoutChannel {
             channel: n,
             problem,
@@ -67,6 +74,16 @@ impl WithoutChannel {
                     .any(is_elsewhere)
         })
     }
+}
+
+/// The causes of a set with their values.
+fn members(fitter: &Fitter<'_>, set: &Fit) -> Vec<(usize, Vec<f64>)> {
+    let places = fitter.places(&set.causes);
+    let of = |cause: &usize| {
+        let own = places.iter().zip(&set.values).filter(|(place, _)| place.0 == *cause);
+        (*cause, own.map(|(_, value)| *value).collect())
+    };
+    set.causes.iter().map(of).collect()
 }
 
 /// The causes that leave least, in all channels and in those but `n`.
@@ -117,7 +134,7 @@ impl Searcher<'_> {
         let is_left = |n: &usize| left.iter().any(|one| one.channel == CHANNEL_NAMES[*n]);
         let channels = (0..CHANNELS).filter(|n| is_left(n) && may_miss(problem, *n));
         let found = channels.flat_map(|n| {
-            let without = WithoutChannel::of(&self.fitter, singles, n);
+            let without = WithoutChannel::of(&self.fitter, singles, None, n);
             let least = without.explain().min_by(|a, b| self.score(a).total_cmp(&self.score(b)));
             least.map(|fit| Fit {
                 state: State::at(problem, &fit.state.model, fit.state.starts.clone()),

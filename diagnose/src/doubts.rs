@@ -120,7 +120,7 @@ pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], st
         let is_open = !is_size && candidate.is_curve() && reaches_inside([low, high], profile.interval);
         if at(profile.value) && !is_open {
             list.push(Doubt::Bound(format!(
-                "{name} ends at the limit of what is tried, {found} of {end}: the cause is another"
+                "{name} ends at the limit of what is tried, {found} of {end}: the cause is another, or the model is off by more than that"
             )));
         } else if is_size && profile.interval.into_iter().any(at) {
             list.push(Doubt::Open(format!(

@@ -213,6 +213,34 @@ pub(crate) fn share_at_limits(starts: &Starts) -> f64 {
     at_limits as f64 / all().count().max(1) as f64
 }
 
+/// What is said of the load steps of a record whose instants end at their limits, if there are any. A column that is shifted moves all alike; where
+/// something else is left of the record, they end at either.
+fn at_limits(record: &Record, late: &[f64]) -> Option<String> {
+    let ended = || late.iter().filter(|late| is_at_limit(**late));
+    let count = ended().count();
+    let times: Vec<String> = (late.iter().zip(&record.free_steps))
+        .filter(|(late, _)| is_at_limit(**late))
+        .map(|(_, row)| format!("{:.6} s", record.time[*row]))
+        .collect();
+    let one_way = ended().all(|late| *late > 0.0) || ended().all(|late| *late < 0.0);
+    let is_shifted = count > 1 && one_way && 2 * count > late.len();
+    (count > 0).then(|| {
+        format!(
+            "{} at the limit of one period, at t = {}: their rows may be wrong by a period and more{}",
+            match count {
+                1 => "1 of these load steps ends".to_owned(),
+                more => format!("{more} of these load steps end"),
+            },
+            times.join(", "),
+            if is_shifted {
+                ". Is the column of the load shifted against the others?"
+            } else {
+                ""
+            },
+        )
+    })
+}
+
 /// What is said of the records whose instants were estimated.
 pub(crate) fn note(problem: &mut Problem, starts: &Starts) {
     for (record, late) in problem.records.iter_mut().zip(&starts.late) {
@@ -230,21 +258,7 @@ pub(crate) fn note(problem: &mut Problem, starts: &Starts) {
                 },
                 if late.len() == 1 { "it" } else { "them" },
             ));
-            let ended: Vec<String> = (late.iter().zip(&record.free_steps))
-                .filter(|(late, _)| is_at_limit(**late))
-                .map(|(_, row)| format!("{:.6} s", record.time[*row]))
-                .collect();
-            if !ended.is_empty() {
-                record.repairs.push(format!(
-                    "{} at the limit of one period, at t = {}: their rows may be wrong by a period and more. \
-                     Is the column of the load shifted against the others?",
-                    match ended.len() {
-                        1 => "1 of these load steps ends".to_owned(),
-                        more => format!("{more} of these load steps end"),
-                    },
-                    ended.join(", ")
-                ));
-            }
+            record.repairs.extend(at_limits(record, late));
         }
     }
 }

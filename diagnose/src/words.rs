@@ -52,12 +52,7 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>, left:
             };
             let (bench, others) = (said(&bench), said(&others));
             if let Some((part, edges)) = &found.all_but {
-                let edges = edges
-                    .as_ref()
-                    .map_or(String::new(), |edges| format!(", with one thing beside it. {edges}"));
-                return format!(
-                    "Without {part} the model as given explains the records{edges}. No known cause explains {part}{bench}{left}{others}."
-                );
+                return without_part(found, part, edges.as_deref(), &bench);
             }
             format!("None of the known causes explains the records{bench}{left}{others}.")
         }
@@ -95,6 +90,32 @@ pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>, left:
             }
         }
     }
+}
+
+/// Said where the model as given explains all but a `part`: what is left of that. What causes ended at that were bent for it says nothing.
+fn without_part(found: &Examined, part: &str, edges: Option<&str>, bench: &str) -> String {
+    let is_bent = |doubt: &&Doubt| {
+        matches!(
+            doubt,
+            Doubt::Bound(_) | Doubt::Open(_) | Doubt::Loose(_) | Doubt::Edges(_) | Doubt::Bench(_)
+        )
+    };
+    let own: Vec<Structure> = (found.structure.iter().filter(|one| one.channel == part))
+        .cloned()
+        .collect();
+    // of a record all that is left of it is told
+    let left = worst_shapes(if own.is_empty() { &found.structure } else { &own });
+    let left = if left.is_empty() {
+        left
+    } else {
+        format!("; left is {left}")
+    };
+    let others: Vec<Doubt> = (found.doubts.iter().filter(|doubt| !is_bent(doubt))).cloned().collect();
+    let others: String = doubts::said(&others).iter().map(|doubt| format!("; {doubt}")).collect();
+    let edges = edges.map_or(String::new(), |edges| format!(", with one thing beside it. {edges}"));
+    format!(
+        "Without {part} the model as given explains the records{edges}. No known cause explains {part}{bench}{left}{others}."
+    )
 }
 
 /// Share of the error above the noise from which on what is said of the rest is that of the rest: swings behind steps that a cause almost

@@ -218,3 +218,36 @@ fn a_core_s_loss_is_among_what_is_named_where_the_current_rests() {
         .flat_map(|cause| cause.rivals.iter().flatten().copied().chain([cause.id]));
     assert!(names.into_iter().any(|id| id == "core_loss"), "{}", findings.sentence);
 }
+
+/// An output that a resistor of 435 ohm empties within hundreds of rows stays where a wrong probe had it begin, so that the first look at the record
+/// does not show the probe.
+#[test]
+fn a_probe_of_twice_the_ratio_is_told_at_an_output_that_hardly_moves() {
+    let bench = Bench {
+        v_in: 200.0,
+        inductance: 86e-6,
+        capacitance: 3.8e-6,
+        f_sw: 237e3,
+        dcr: 1.2,
+        r_ds_on: 2.3,
+        v_f: 1.1,
+        rows: 120,
+        duty: vec![(0, 0.57), (11, 0.5), (49, 0.79), (101, 0.63)],
+        load: vec![
+            (0.0, 1.0 / 435.0, 0.64),
+            (11.0, 1.0 / 435.0, 0.05),
+            (49.0, 1.0 / 435.0, 0.77),
+        ],
+        gain: [2.0, 1.0, 1.0, 1.0],
+        ..Bench::default()
+    };
+    let model = model(&bench);
+    let mut random = Noise(77);
+    let drawn = |row: usize| at(&bench.load, row as isize, |step| step.0 as usize).2;
+    let table = (bench.run().without(&["i_l", "i_out"]))
+        .with("r_load", vec![435.0; bench.rows])
+        .with("i_load", (0..bench.rows).map(drawn).collect())
+        .measured(&[("v_out", 0.1, 0.046), ("v_in", 0.1, 0.07)], &mut random);
+    let found = found(&model, &table);
+    assert!(found.sentence.contains("2 times what there is"), "{}", found.sentence);
+}

@@ -73,8 +73,8 @@ fn of(problem: &Problem, record: &Record) -> Option<String> {
 /// What one wrong point leaves of an error goes without it: to a quarter at most. Of points that are of no such form none takes as much with it.
 const OF_ONE: f64 = 0.25;
 
-/// Leaves out the voltage of the one settled point without which all others are of the form, and says so; `usual` is the usual voltage. A number that
-/// is mistyped is off by more than any meter, and no cause makes it.
+/// Leaves out the voltage of the one settled point of a table without which all others are of the form, and says so among the repairs of its record. A
+/// number that is mistyped is off by more than any meter, and no cause makes it.
 pub(crate) fn leave_out_odd(problem: &mut Problem) {
     let (plant, usual) = (&problem.base.plant, problem.bases.v);
     for record in problem.records.iter_mut().filter(|record| record.settled) {
@@ -83,6 +83,7 @@ pub(crate) fn leave_out_odd(problem: &mut Problem) {
     }
 }
 
+/// [`leave_out_odd`] of one table; `usual` is the usual output voltage, V.
 fn leave_out_odd_of(record: &mut Record, ideal: &Ideal, usual: f64) {
     // the current that a wrong voltage would draw is wrong as well, and a point by itself out there bends the others to it
     let at = |row: usize| Some((row, point(ideal, record, row, ideal.volts(record.duty[row]))?));
@@ -109,7 +110,9 @@ fn leave_out_odd_of(record: &mut Record, ideal: &Ideal, usual: f64) {
     let mut own = own;
     own.push((0..points.len()).map(|n| if n == place { 1.0 } else { 0.0 }).collect());
     let above = weights(&own, &v).last().copied().unwrap_or(f64::NAN);
-    if above.abs() < LEFT * usual || above.abs() < SURELY * least {
+    // no number is no surety
+    let is_sure = above.abs() > LEFT * usual && above.abs() > SURELY * least;
+    if !is_sure {
         return;
     }
     let (v, duty, i) = points[place];
@@ -122,7 +125,8 @@ fn leave_out_odd_of(record: &mut Record, ideal: &Ideal, usual: f64) {
     record.measured[0][rows[place]] = f64::NAN;
 }
 
-/// Standard deviations of the others by which a point is surely off: the largest of 64 is 3.5 beside the rest once in thirty tables, 6 once in a million.
+/// Standard deviations of the others by which a point is surely off: the largest of 64 is 3.5 beside the rest once in thirty tables, 6 once in millions. A
+/// convention beyond that: what few others leave is known poorly.
 const SURELY: f64 = 10.0;
 
 /// Counts of a period that are tried, as multiples of those whose rounding scatters the voltage by as much as the points are beside.

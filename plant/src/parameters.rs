@@ -242,6 +242,8 @@ table! {
     Inductor at inductor {
         /// Winding resistance, ohm.
         dcr: f64,
+        /// What it rises by with the square of the steady current, ohm/A^2.
+        heating: f64,
         /// Share of the inductance that is lost far above `i_sat`, 1.
         saturation: f64,
         /// Current at which half of that share is lost, A.

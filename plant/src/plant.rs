@@ -9,7 +9,7 @@ use crate::check::check;
 use crate::effects::duty_delay::{self, Queue};
 use crate::effects::empirical::Correction;
 use crate::effects::node_capacitance::{Edge, Node};
-use crate::effects::{dcr, duty_offset, duty_quantisation, load_setting, minimum_on_time};
+use crate::effects::{dcr, duty_offset, duty_quantisation, heating, load_setting, minimum_on_time};
 use crate::entry::Way;
 use crate::full::{Full, Path, States, beside};
 use crate::gates::{Gate, GateTiming, Gates};
@@ -34,6 +34,7 @@ pub struct Plant {
     pub(crate) node: Node,
     pub(crate) sensing: Sensing,
     correction: Correction,
+    pace: Pace,
     /// How it has to be computed.
     pub(crate) way: Way,
     pub(crate) state: PlantState,
@@ -57,6 +58,9 @@ pub struct PlantState {
     pub(crate) slow: f64,
     pub(crate) memory: Memory,
     pub(crate) sample: Sample,
+    /// The steady current from which the winding is warm, A.
+    #[serde(default)]
+    pub(crate) warm: f64,
 }
 
 impl Plant {
@@ -68,15 +72,13 @@ impl Plant {
         check(parameters)?;
         let p = parameters;
         let (timing, sensing) = (GateTiming::new(p), Sensing::new(p));
-        let switch = &p.switch;
-        let r =
-            dcr::in_series(&p.inductor) + p.source.resistance + switch.r_ds_on.max(switch.r_d).max(switch.r_ds_on_low);
         let mut plant = Plant {
             t_sw: p.t_sw(),
-            plain: Plain::new(&p.converter, r, p.load.v_fold),
+            plain: plain(p),
             legs: Legs::new(p),
             full: Full::new(p),
             correction: Correction::new(p),
+            pace: Pace::Fine,
             way: catalogue::way(p),
             timing,
             node: Node::new(p),
@@ -95,6 +97,7 @@ impl Plant {
                 slow: 0.0,
                 memory: Memory::new(p.sensors.seed, [0.0; 4]),
                 sample: Sample::default(),
+                warm: 0.0,
             },
         };
         plant.reset_at(0.0, 0.0, &Load::default());
@@ -140,7 +143,27 @@ impl Plant {
 
     /// Continues from a checkpoint of a plant with the same parameters.
     pub fn restore(&mut self, state: &PlantState) {
+        self.warm_from(state.warm);
         self.state = *state;
+    }
+
+    /// Gives the winding the resistance that it has behind a long time at `current` A.
+    pub(crate) fn warm_from(&mut self, current: f64) {
+        if self.parameters.inductor.heating == 0.0 || current == self.state.warm {
+            return;
+        }
+        let warm = heating::warmed(&self.parameters, current);
+        (self.plain, self.legs, self.full) = (plain(&warm), Legs::new(&warm), Full::new(&warm));
+        self.full.set_pace(self.pace);
+        self.state.warm = current;
+    }
+
+    /// Mean current of the inductor where the load draws `drawn` A and `duty` is in force.
+    pub(crate) fn steady_current(&self, drawn: f64, duty: f64) -> f64 {
+        let topology = self.parameters.converter.topology;
+        let give = topology.on().1 * duty + topology.off().1 * (1.0 - duty);
+        // an output that receives nothing says nothing of the current
+        if give > 0.0 { drawn / give } else { 0.0 }
     }
 
     /// Puts the plant to a sampling instant with `v_out` V and `i_l` A under `load`; delayed duties are those that would
@@ -149,6 +172,8 @@ impl Plant {
         let drawn = load_setting::drawn(&self.parameters.load, load);
         let converter = &self.parameters.converter;
         let duty = converter.topology.duty(converter.v_in, v_out);
+        let current = self.plain.load_current(&drawn, v_out);
+        self.warm_from(self.steady_current(current, duty));
         let x = self.initial(v_out, i_l, &drawn, duty);
         let edge = self.node.behind(self.is_on(duty));
         let state = &mut self.state;
@@ -305,6 +330,7 @@ impl Plant {
     #[must_use]
     pub fn at_pace(mut self, pace: Pace) -> Self {
         self.full.set_pace(pace);
+        self.pace = pace;
         self
     }
 
@@ -392,4 +418,11 @@ impl Plant {
         };
         self.state.sample
     }
+}
+
+/// The circuit of two states, with the largest resistance that a path has.
+fn plain(p: &Parameters) -> Plain {
+    let switch = &p.switch;
+    let r = dcr::in_series(&p.inductor) + p.source.resistance + switch.r_ds_on.max(switch.r_d).max(switch.r_ds_on_low);
+    Plain::new(&p.converter, r, p.load.v_fold)
 }

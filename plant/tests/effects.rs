@@ -235,6 +235,25 @@ fn series_losses_lower_the_settled_voltage_as_computed() {
     }
 }
 
+/// `v = d v_in - (dcr + heating i^2) i`; and a run stays as warm as where it began.
+#[test]
+fn a_winding_that_warms_has_the_resistance_of_its_steady_current() {
+    let p = changed(|p| (p.inductor.dcr, p.inductor.heating) = (0.2, 0.01));
+    let mut plant = plant(&p);
+    let at_rest = |plant: &mut Plant, i: f64| plant.rest(0.5, &Load::current(i)).0.v_out;
+    for (i, expected) in [(2.0, 100.0 - 0.24 * 2.0), (5.0, 100.0 - 0.45 * 5.0)] {
+        let v = at_rest(&mut plant, i);
+        // the ripple's own share, a third of a percent of what is lost
+        assert!((v - expected).abs() < 0.02, "{i} A: {v}, {expected}");
+    }
+    // from the point at 5 A on
+    let last = (0..20_000)
+        .map(|_| plant.step(0.5, &Load::current(2.0)).v_out)
+        .last()
+        .unwrap();
+    assert!((last - (100.0 - 0.45 * 2.0)).abs() < 0.02, "{last}");
+}
+
 #[test]
 fn a_late_sample_turns_ripple_into_bias() {
     // a sampling instant off the middle of a slope reads i off its mean

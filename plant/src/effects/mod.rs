@@ -22,6 +22,7 @@ pub(crate) mod duty_quantisation;
 pub(crate) mod empirical;
 pub(crate) mod esl;
 pub(crate) mod esr;
+pub(crate) mod heating;
 pub(crate) mod input_ripple;
 pub(crate) mod load_setting;
 pub(crate) mod minimum_on_time;
@@ -40,6 +41,7 @@ pub(crate) mod switch_resistance;
 /// All effects, in the order in which power flows.
 pub(crate) const ALL: &[&Effect] = &[
     &dcr::EFFECT,
+    &heating::EFFECT,
     &saturation::EFFECT,
     &core_loss::EFFECT,
     &esr::EFFECT,

@@ -12,12 +12,14 @@
 //! does not speak against it.
 
 use crate::attribute::SURE;
+use crate::causes::Kind;
 use crate::doubts::Doubt;
 use crate::drive::Model;
 use crate::examine::{Examined, examined};
 use crate::findings::{Aside, Verdict};
 use crate::fit::{Fitter, ROUGH, State};
-use crate::gain::{self, Pair};
+use crate::gain::{self, MUCH_WORSE, Pair};
+use crate::held_out::held;
 use crate::instants;
 use crate::level::threshold;
 use crate::noise;
@@ -36,8 +38,6 @@ const MAIN_PART: f64 = 0.25;
 /// Fewest rows of a record: settled points and short tables have more causes than places for structure.
 // five blocks of ten, from which on `shape` sees slow structure
 const FEWEST_ROWS: usize = 50;
-/// Fewest channels that are left: one alone is given by many causes.
-const FEWEST_CHANNELS: usize = 2;
 /// Fewest records that are left, so that not a single run decides.
 const FEWEST_RECORDS: usize = 2;
 /// The causes may make what was set aside this much worse, in squares, since what disturbs it may run against them: an effect and a
@@ -179,6 +179,7 @@ pub fn explained_without(
                 found.named.len() <= part.most_causes()
                     && is_borne(&found, part, &whole.problem, records, base)
                     && pair.as_ref().is_none_or(|pair| helps(pair, &found))
+                    && tells_alone(part, &found, whole, heldout, base)
             }
             Verdict::MostlyExplained | Verdict::Unexplained => false,
         };
@@ -264,14 +265,13 @@ fn left_by_one_cause(whole: &Examined, n: usize) -> f64 {
     inside.unwrap_or(f64::INFINITY).min(left(&problem, best))
 }
 
-/// Whether enough is measured without a channel, and it is no input of the model.
+/// Whether the converter still shows without a channel, and it is no input of the model.
 pub(crate) fn may_miss(problem: &Problem, channel: usize) -> bool {
     let is_measured = |n: usize| problem.sigma[n].is_finite();
     let is_load = channel == LOAD_CURRENT && problem.records.iter().any(|record| record.metered.is_some());
-    let left = (0..CHANNELS).filter(|n| *n != channel && is_measured(*n)).count();
     // the voltage or the inductor current: the others follow from them, or stand still
     let moves = (0..2).any(|n| n != channel && is_measured(n));
-    is_measured(channel) && !is_load && left >= FEWEST_CHANNELS && moves
+    is_measured(channel) && !is_load && moves
 }
 
 /// Whether the causes do not make records worse that no fit has seen, by more than chance: what they explain would be something else. An
@@ -280,6 +280,36 @@ fn helps(pair: &Pair, found: &Examined) -> bool {
     let (before, after) = (pair.before.chi2, dot(&pair.after.residual, &pair.after.residual));
     let parameters = found.attribution.best.as_ref().map_or(0, |best| best.values.len());
     after < before + threshold(parameters, found.attribution.inflation)
+}
+
+/// Whether one channel is enough to tell of the causes, where no other is left beside the one that was set aside: only with a held-out record, and of
+/// records that are read as they were made. Not of an instrument, which would be the one that is left. Nor of a part's curve: where that is another than the
+/// law's it bends to the one channel, and the other shows it. In the held-out record the other may be off by more, since what disturbs it may run
+/// against the causes, but a cause that takes it much further off is one of a bent fit.
+fn tells_alone(part: Part, found: &Examined, whole: &Examined, heldout: &[Record], base: &Model) -> bool {
+    let Part::Channel(n) = part else { return true };
+    let others = (0..CHANNELS).filter(|other| *other != n && whole.problem.sigma[*other].is_finite());
+    if others.count() > 1 {
+        return true;
+    }
+    let attribution = &found.attribution;
+    let mut causes =
+        (attribution.best.iter().flat_map(|best| &best.causes)).map(|cause| &attribution.candidates[*cause]);
+    let is_odd = |doubt: &Doubt| matches!(doubt, Doubt::Bench(_));
+    if whole.doubts.iter().any(is_odd) || causes.any(|one| one.is_curve() || one.cause.kind == Kind::Instrument) {
+        return false;
+    }
+    let state = attribution.state();
+    let trim = state.starts.trim_or_none(base.plant.converter.f_sw);
+    let pair = held(&whole.problem, heldout, base, state, trim);
+    pair.is_some_and(|pair| {
+        let of = |state: &State| -> f64 {
+            let records = 0..pair.problem.records.len();
+            let values = records.flat_map(|record| noise::channel(&pair.problem, &state.residual, record, n));
+            values.map(|left| left * left).sum()
+        };
+        of(&pair.after) <= MUCH_WORSE * of(&pair.before)
+    })
 }
 
 /// Whether what was set aside bears the causes, and shows nothing that the converter does and its instruments do not.

@@ -162,6 +162,9 @@ pub fn without_search(problem: Problem, null: State) -> (Problem, Attribution) {
     (problem, attribution)
 }
 
+/// What settled points alone show of a winding.
+const WARMS: &str = "inductor.heating";
+
 /// The causes that may be: those that change nothing of what is certain, and no load or meter that no record has. Those could do nothing but
 /// change the integration. Nor forms that settled points cannot tell from simpler ones.
 fn sought(problem: &Problem) -> Vec<Candidate> {
@@ -169,10 +172,16 @@ fn sought(problem: &Problem) -> Vec<Candidate> {
     // a capture is a settled point that shows its period
     let shows = |record: &Record| !record.settled || record.capture.is_some();
     let has_a_course = problem.records.iter().any(shows);
+    // a record over time is as warm at its end as where it began
+    let has_points = problem
+        .records
+        .iter()
+        .any(|record| record.settled && record.capture.is_none());
     list.retain(|candidate| {
         is_there(problem, candidate)
             && !candidate.changes(&problem.base.certain)
             && (has_a_course || !candidate.form.is_of_a_course)
+            && (has_points || !candidate.changes(&[WARMS.to_owned()]))
     });
     list
 }

@@ -22,13 +22,13 @@ use crate::held_out::held;
 use crate::instants;
 use crate::left_out;
 use crate::noise::{self, Outlier};
-use crate::preflight;
 use crate::problem::{Problem, capture_drive};
 use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 use crate::resistors;
+use crate::supply;
 use crate::unseen;
 use crate::whiteness;
 use crate::words::{self, MOST_OF_IT, nearest, other_carrier as other_carrier_said, sentence, shifted};
@@ -88,7 +88,7 @@ pub fn diagnose_knowing(
     let kept = train.clone();
     let work = Work::default();
     let mut found = examined(train, &base, &work, say);
-    let sources = preflight::sources(&found.problem.records, heldout, &found.problem.base);
+    let sources = supply::sources(&found.problem.records, heldout, &found.problem.base);
     say(Progress::Stage("held-out records"));
     let mut pair = found.judged(heldout, &base);
     // with the carrier that was found

@@ -84,14 +84,14 @@ pub enum Doubt {
     Noise(String),
     /// The records look like those of the model in another reading: a fault of the bench.
     Bench(String),
-    /// What stands beside every fit for the edges of the gate is more than edges.
-    Edges(String),
+    /// What stands beside every fit for the edges of the gate is more than edges; without words where something else is left, which bends it.
+    Edges(Option<String>),
 }
 
 /// The doubts about an explanation.
 pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], structure: &[Structure]) -> Vec<Doubt> {
     let mut list: Vec<Doubt> = balance::broken(problem).map(Doubt::Kind).into_iter().collect();
-    list.extend(edges(attribution));
+    list.extend(edges(attribution, structure));
     let Some(best) = &attribution.best else {
         return match list.is_empty() {
             true => freedom(problem, structure),
@@ -116,13 +116,15 @@ pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], st
         let [found, end] = [profile.value, end].map(|value| si(value, unit(profile.unit)));
         let name = format!("{} of {}", profile.name, candidate.cause.id);
         let is_size = place < candidate.sizes();
+        // of a line whose frequency may be any a record holds no period: it is a drift
+        let is_of_line = candidate.form.search == Search::Line;
         // a valley without an end: what only shapes the curve of a part may lie anywhere in it
         let is_open = !is_size && candidate.is_curve() && reaches_inside([low, high], profile.interval);
         if at(profile.value) && !is_open {
             list.push(Doubt::Bound(format!(
                 "{name} ends at the limit of what is tried, {found} of {end}: the cause is another, or the model is off by more than that"
             )));
-        } else if is_size && profile.interval.into_iter().any(at) {
+        } else if (is_size || is_of_line) && profile.interval.into_iter().any(at) {
             list.push(Doubt::Open(format!(
                 "{name} is not held by the records: its interval reaches the limit of what is tried, {end}"
             )));
@@ -133,16 +135,20 @@ pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], st
 }
 
 /// A trim that no gate needs is left out of the model that is written, which then does not give the records any more.
-fn edges(attribution: &Attribution) -> Option<Doubt> {
+fn edges(attribution: &Attribution, structure: &[Structure]) -> Option<Doubt> {
     let state = attribution.state();
     let trim = state.starts.trim_of_nobody(state.model.plant.converter.f_sw)?;
     let time = si(trim.abs() * state.model.plant.t_sw(), unit("s"));
     let way = if trim > 0.0 { "longer" } else { "shorter" };
-    Some(Doubt::Edges(format!(
-        "beside all causes the switch has to be on {time} {way}, {:.2} % of the period, which is more than edges of a gate are taken for: \
-         look at dead times, delays and what the switching node does, above all where the inductor's current is below 0",
-        100.0 * trim.abs()
-    )))
+    let words = || {
+        format!(
+            "beside all causes the switch has to be on {time} {way}, {:.2} % of the period, which is more than edges of a gate are taken for: \
+             look at dead times, delays and what the switching node does, above all where the inductor's current is below 0",
+            100.0 * trim.abs()
+        )
+    };
+    // what is left bends it: from a probe that droops or a load that rings to a third of a period
+    Some(Doubt::Edges(structure.is_empty().then(words)))
 }
 
 /// Noise of a channel that holds nothing, as a share of the root mean square of what it shows or has to be able to show.
@@ -234,6 +240,7 @@ pub fn forbids(named: &[Named], doubts: &[Doubt]) -> bool {
 /// The doubts in words.
 pub fn said(doubts: &[Doubt]) -> Vec<String> {
     let words = |doubt: &Doubt| match doubt {
+        Doubt::Edges(words) => words.clone(),
         Doubt::Bound(words)
         | Doubt::Open(words)
         | Doubt::Freedom(words)
@@ -241,10 +248,9 @@ pub fn said(doubts: &[Doubt]) -> Vec<String> {
         | Doubt::HeldOut(_, words)
         | Doubt::Kind(words)
         | Doubt::Noise(words)
-        | Doubt::Bench(words)
-        | Doubt::Edges(words) => words.clone(),
+        | Doubt::Bench(words) => Some(words.clone()),
     };
-    doubts.iter().map(words).collect()
+    doubts.iter().filter_map(words).collect()
 }
 
 #[cfg(test)]

@@ -50,6 +50,8 @@ pub struct Examined {
     pub outliers: Vec<Outlier>,
     /// What was seen before any fit.
     pub odd: Vec<String>,
+    /// Other readings of single records, of those in `odd`: what held-out records speak against may be one of them.
+    pub readings: Vec<String>,
     /// The channel or record without which the model as given explains the records, and what its edges do beside it.
     pub all_but: Option<(String, Option<String>)>,
     /// The answer.
@@ -137,9 +139,16 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
         lines,
         doubts,
         outliers,
+        readings: readings(&misread, &odd),
         odd,
         all_but: None,
     }
+}
+
+/// Other readings that are no more than notes, and that causes which explain the records do not refute.
+fn readings(misread: &[Misread], odd: &[String]) -> Vec<String> {
+    let words = misread.iter().map(|one| &one.words);
+    words.filter(|words| odd.contains(words)).cloned().collect()
 }
 
 /// Causes that move samples or duties in time.
@@ -182,6 +191,7 @@ impl Examined {
             lines: Vec::new(),
             outliers,
             odd: Vec::new(),
+            readings: Vec::new(),
             all_but: None,
         }
     }

@@ -1,15 +1,16 @@
 //! What held-out records say against an explanation.
 
-use crate::attribute::Attribution;
+use crate::attribute::{Attribution, SURE};
 use crate::doubts::Doubt;
 use crate::drive::Model;
 use crate::fit::{Fit, State};
 use crate::gain::{self, MUCH_WORSE, Pair, Shift};
 use crate::held_table;
-use crate::level::ACCURACY;
+use crate::left_open::NOISE_ALONE;
+use crate::level::{ACCURACY, threshold};
 use crate::noise;
-use crate::problem::Problem;
-use crate::record::{CHANNELS, LOAD_CURRENT, QUANTITIES, Record};
+use crate::problem::{Problem, dot};
+use crate::record::{CHANNEL_NAMES, CHANNELS, LOAD_CURRENT, QUANTITIES, Record};
 use crate::words::si;
 
 /// Correlation of neighbours from which on an error is more than noise: a coarser range of the scope or a wild sample leaves none,
@@ -19,6 +20,10 @@ const RELATED: f64 = 0.3;
 /// What the law of a part's curve may be off by where no fit has been, as a share of what the part does: another law is met within 3 % of the
 /// capacitance where records have been (`tests/ceramic.rs`), and a blind case left 1.2 % of the error beyond.
 const OF_CURVE: f64 = 0.03;
+
+/// A held-out record of which a model leaves so many times the squares that the model as given leaves is no record of a sensor that has shifted. A
+/// convention, above what noise and the edges' trim move.
+const GROWN: f64 = 1.25;
 
 /// What kind of causes was found.
 #[derive(Debug, Clone, Copy, Default)]
@@ -74,7 +79,48 @@ pub fn against(pair: &Pair, training: &Problem, at: &State, found: &Of) -> Vec<D
     });
     let spoilt = held_table::spoilt(pair).into_iter();
     let spoilt = spoilt.map(|(channels, words)| Doubt::HeldOut(channels, words));
-    of_records.chain(points(pair)).chain(spoilt).collect()
+    let mut list: Vec<Doubt> = of_records.chain(points(pair)).chain(spoilt).collect();
+    if list.is_empty() {
+        list.extend(grown(pair, "with these causes"));
+    }
+    list
+}
+
+/// Held-out records that the model with `what` makes worse by more than chance, in two channels or more: what shifts between records is one sensor, and it alone.
+/// One channel is enough where the model as given leaves noise alone: no shift undoes a cause.
+pub fn grown(pair: &Pair, what: &str) -> Vec<Doubt> {
+    let of = |(index, record): (usize, &Record)| {
+        let cell = |state: &State, n: usize| {
+            let values = noise::channel(&pair.problem, &state.residual, index, n);
+            dot(&values, &values)
+        };
+        let each: Vec<(usize, f64, f64)> = (0..CHANNELS)
+            .filter(|n| *n != LOAD_CURRENT || record.metered.is_none())
+            .map(|n| (n, cell(&pair.before, n), cell(&pair.after, n)))
+            .filter(|(_, before, after)| *before > 0.0 && *after > 0.0)
+            .collect();
+        let least = SURE * threshold(1, 1.0);
+        let worse: Vec<usize> = (each.iter().filter(|(_, before, after)| after - before > least))
+            .map(|(n, ..)| *n)
+            .collect();
+        let count = (0..CHANNELS)
+            .flat_map(|n| noise::channel(&pair.problem, &pair.before.residual, index, n))
+            .filter(|left| *left != 0.0)
+            .count();
+        let (before, after) = (each.iter()).fold((0.0, 0.0), |(b, a), (_, before, after)| (b + before, a + after));
+        let is_it = worse.len() > 1 || !worse.is_empty() && before < NOISE_ALONE * count as f64;
+        (!record.settled && is_it && after > GROWN * before).then(|| {
+            let channels: Vec<&str> = worse.iter().map(|n| CHANNEL_NAMES[*n]).collect();
+            let words = format!(
+                "{} of the held-out record {} are further from the model {what} than from the model as given, {:.1} times all in all: they do not hold there",
+                channels.join(", "),
+                record.name,
+                (after / before).sqrt()
+            );
+            Doubt::HeldOut(worse, words)
+        })
+    };
+    pair.problem.records.iter().enumerate().filter_map(of).collect()
 }
 
 /// What tables of settled points say against any model: an error that no meter makes.

@@ -198,6 +198,14 @@ impl Ideal {
         })
     }
 
+    /// Share of the period in which the inductor has the source's voltage.
+    pub fn source_share(&self, duty: f64) -> f64 {
+        match self.topology {
+            Topology::Boost => 1.0,
+            Topology::Buck | Topology::BuckBoost => duty,
+        }
+    }
+
     /// Source voltage that makes an output voltage at a duty, when `drop` is lost at the inductor over a period, V.
     pub fn source(&self, volts: f64, duty: f64, drop: f64) -> f64 {
         match self.topology {

@@ -16,6 +16,7 @@ use crate::basis::{Basis, FARTHEST};
 use crate::drive::{FREE_APART, Model};
 use crate::fit::State;
 use crate::flicker;
+use crate::left_out::TELLING;
 use crate::level::threshold;
 use crate::noise;
 use crate::parallel;
@@ -52,7 +53,7 @@ fn steps(record: &Record) -> Vec<LoadStep> {
     };
     let inside = |step: &LoadStep| {
         let mut segments = record.segments.iter();
-        segments.any(|s| s.start + FREE_APART <= step.first && step.last + FREE_APART <= s.end)
+        segments.any(|s| s.start + FREE_APART <= step.first && step.last + TELLING <= s.end)
     };
     let mut steps: Vec<LoadStep> = all.iter().copied().filter(|step| alone(step) && inside(step)).collect();
     steps.truncate(MOST);

@@ -4,9 +4,9 @@ use crate::doubts::Doubt;
 use crate::drive::Model;
 use crate::examine::{Examined, named};
 use crate::findings::Verdict;
-use crate::fit::Fit;
+use crate::fit::{Fit, State};
 use crate::gain::Pair;
-use crate::held_out::{Of, against, held, points};
+use crate::held_out::{Of, against, grown, held, points};
 use crate::left_open::{self, Chosen};
 use crate::level::threshold;
 use crate::record::Record;
@@ -33,7 +33,9 @@ impl Examined {
         let pair = self.without_chance(heldout, base, &pair).unwrap_or(pair);
         let found = self.attribution.state();
         let fails: Vec<Doubt> = match self.verdict {
-            Verdict::Consistent => points(&pair).collect(),
+            Verdict::Consistent => points(&pair)
+                .chain(grown(&pair, "with the edges that the training records ask for"))
+                .collect(),
             // what is no more than the step of a converter has no values that could fail to hold
             Verdict::Explained | Verdict::Ambiguous if !self.named.is_empty() => {
                 let best = self.attribution.best.as_ref();
@@ -43,9 +45,11 @@ impl Examined {
             _ => Vec::new(),
         };
         if fails.is_empty() {
-            return Some(pair);
+            let is_shifted = self.verdict == Verdict::Ambiguous && !pair.shifts(&self.problem, found).is_empty();
+            let other = is_shifted.then(|| self.led_by_what_holds(heldout, base, Some(&pair)));
+            return Some(other.flatten().unwrap_or(pair));
         }
-        if let Some(pair) = self.led_by_what_holds(heldout, base) {
+        if let Some(pair) = self.led_by_what_holds(heldout, base, None) {
             return Some(pair);
         }
         let explained = (&self.attribution, &self.profiles[..]);
@@ -54,6 +58,10 @@ impl Examined {
         }
         self.verdict = Verdict::Unexplained;
         self.doubts.extend(fails);
+        // a record whose rows are late is explained by a delay, which no other record has
+        let readings = std::mem::take(&mut self.readings);
+        self.odd.retain(|words| !readings.contains(words));
+        self.doubts.extend(readings.into_iter().map(Doubt::Bench));
         Some(pair)
     }
 
@@ -91,9 +99,17 @@ impl Examined {
     }
 
     /// Lets a member of the tie lead that holds in the held-out records, the one that fits them best, if there is one; they with it. The data that
-    /// the causes were sought in do not put the members in order, so that the one that does not hold stays in the tie.
-    fn led_by_what_holds(&mut self, heldout: &[Record], base: &Model) -> Option<Pair> {
+    /// the causes were sought in do not put the members in order, so that the one that does not hold stays in the tie. Where the leader leaves no more
+    /// than what a sensor would that has `shifted`, the other one has to do clearly better, without such a sensor.
+    fn led_by_what_holds(&mut self, heldout: &[Record], base: &Model, shifted: Option<&Pair>) -> Option<Pair> {
         let attribution = &self.attribution;
+        let chi2 = |pair: &Pair| pair.total().1 * pair.problem.count() as f64;
+        let is_clear = |pair: &Pair, state: &State, rival: &Fit| {
+            shifted.is_none_or(|own| {
+                let least = BY_CHANCE * threshold(rival.values.len(), attribution.inflation);
+                chi2(pair) < chi2(own) - least && pair.shifts(&self.problem, state).is_empty()
+            })
+        };
         let holding = |(member, other, rival): (usize, usize, &Fit)| {
             let state = &rival.state;
             let leaves = structures(&self.problem, &attribution.null, state, attribution.inflation);
@@ -101,7 +117,7 @@ impl Examined {
             let pair = held(&self.problem, heldout, base, state, trim)?;
             let holds =
                 leaves.is_empty() && against(&pair, &self.problem, state, &Of::fit(attribution, rival)).is_empty();
-            holds.then(|| (member, other, rival.clone(), pair))
+            (holds && is_clear(&pair, state, rival)).then(|| (member, other, rival.clone(), pair))
         };
         let held = rivals::in_one_place(attribution).filter_map(holding);
         let (member, other, leader, pair) = held.min_by(|a, b| a.3.total().1.total_cmp(&b.3.total().1))?;

@@ -103,7 +103,7 @@ pub fn chosen(
 
 /// Mean square over that of the noise which held-out records may leave, whatever the model as given leaves of them: noise alone leaves as much in ten
 /// values once in ten tables.
-const NOISE_ALONE: f64 = 1.6;
+pub(crate) const NOISE_ALONE: f64 = 1.6;
 
 /// What to say of a chosen value.
 fn words(profile: &Profile, value: f64, is_step: bool) -> String {

@@ -77,6 +77,7 @@ mod sides;
 mod slopes;
 mod small;
 mod spectrum;
+pub mod supply;
 mod taken_out;
 pub mod ties;
 pub mod timing;

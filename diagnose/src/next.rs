@@ -4,7 +4,7 @@ use plant::{Load, Topology};
 use serde::Serialize;
 
 use crate::attribute::Attribution;
-use crate::causes::CAUSES;
+use crate::causes::{CAUSES, Form};
 use crate::drive::Model;
 use crate::findings::{Findings, Named};
 use crate::fit::State;
@@ -104,9 +104,17 @@ pub fn advice(findings: &Findings) -> Option<String> {
         true => " A column of the voltage at the converter's input (`v_in`) would show what the source does.",
         false => "",
     };
+    let own = tied
+        .iter()
+        .flat_map(|cause| cause.parameters.keys().map(|name| (cause.id, *name)));
+    let of_rivals = tied.iter().flat_map(|cause| cause.rival_values.iter().flatten());
+    let moved: Vec<(&str, &str)> = own.chain(of_rivals.map(|value| (value.id, value.parameter))).collect();
     let key = |id: &&str| {
         let cause = CAUSES.iter().find(|cause| cause.id == *id)?;
-        cause.forms[0].knobs[0].known_as().first()
+        // the form that ties: a load's resistors have another key than its settings
+        let is_moved = |form: &&Form| form.knobs.iter().all(|knob| moved.contains(&(*id, knob.name)));
+        let form = cause.forms.iter().find(is_moved).unwrap_or(&cause.forms[0]);
+        form.knobs[0].known_as().first()
     };
     let keys: Vec<String> = ids
         .iter()

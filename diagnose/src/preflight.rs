@@ -10,12 +10,13 @@ use plant::Topology;
 
 use crate::drive::Model;
 use crate::fit::State;
-use crate::ideal::{self, Ideal};
+use crate::ideal;
 use crate::median::median;
 use crate::noise;
 use crate::parallel;
-use crate::problem::{Problem, duty_accuracy};
+use crate::problem::Problem;
 use crate::record::{CHANNEL_NAMES, CHANNELS, QUANTITIES, Record};
+use crate::supply;
 
 /// Farthest shift that is tried, rows.
 const FARTHEST: isize = 4;
@@ -23,12 +24,6 @@ const FARTHEST: isize = 4;
 const LEFT: f64 = 0.2;
 /// ... where the record as it is leaves this mean square over the noise: below it there is nothing to mend.
 const WRONG: f64 = 4.0;
-/// Sources of two records that differ by this share were set so: losses differ by less, and so do supplies.
-const OTHER_SOURCE: f64 = 0.06;
-/// Smallest duty that a source voltage is read off.
-// a convention: below it a millivolt of the output is 20 of the source
-const LEAST_DUTY: f64 = 0.05;
-
 /// Ratios of probes and shunts that are set wrong. The list of causes ends at half and at one and a half.
 const PROBES: [f64; 4] = [2.0, 10.0, 0.5, 0.1];
 
@@ -310,8 +305,16 @@ fn tried(problem: &Problem, null: &State, index: usize) -> Vec<Reading> {
                 }),
         );
     }
+    // where no meter shows what the load draws, the inductor's current may be right and the load's column wrong
+    if !has(2) && record.metered.is_none() {
+        let loads = list.iter().filter_map(|reading| match reading {
+            Reading::Probe(1, times) => Some(Reading::Load(*times)),
+            _ => None,
+        });
+        list.extend(loads.collect::<Vec<_>>());
+    }
     list.push(Reading::OtherSwitch);
-    list.extend(other_source(record, &null.model).map(Reading::Source));
+    list.extend(supply::other(record, &null.model).map(Reading::Source));
     list.extend(other_load(record).map(Reading::Load));
     let own = null.model.plant.converter.topology;
     let kinds = [Topology::Buck, Topology::Boost, Topology::BuckBoost];
@@ -337,22 +340,6 @@ fn is_nearer(problem: &Problem, null: &State, index: usize, (n, times): (usize, 
     other < own
 }
 
-/// How far a measured source voltage may lie from the one that the output shows: two meters of half a percent, and losses.
-const AGREES: f64 = 0.03;
-
-/// Supplies that are set wrong: one twice or half of what it should be is rather a probe of another ratio.
-const SUPPLIES: std::ops::Range<f64> = 0.55..1.8;
-
-/// The source voltage that a record shows over that of the plant file, if it is another; a measured one has to agree.
-fn other_source(record: &Record, model: &Model) -> Option<f64> {
-    let own = model.plant.converter.v_in * record.v_in_ratio;
-    let times = shown_source(record, model)? / own;
-    let measured = record.measured[3].iter().copied().filter(|v| v.is_finite());
-    let measured: Vec<f64> = measured.collect();
-    let agrees = measured.is_empty() || (median(measured) / own / times - 1.0).abs() < AGREES;
-    (agrees && SUPPLIES.contains(&times) && (times - 1.0).abs() > OTHER_SOURCE).then_some(times)
-}
-
 /// A drawn current over the set one from which on the load is another: meters and resistors are off by some percent together.
 const OTHER_LOAD: f64 = 0.06;
 
@@ -368,46 +355,6 @@ fn other_load(record: &Record) -> Option<f64> {
         }
     }));
     ((times - 1.0).abs() > OTHER_LOAD && times > 0.0).then_some(times)
-}
-
-/// Source voltage that a record's voltages and duties show, without the losses that all records share; nothing if the current may rest.
-fn shown_source(record: &Record, model: &Model) -> Option<f64> {
-    let p = &model.plant.converter;
-    let ideal = Ideal::at(&model.plant, 1.0);
-    // a trim of the edges moves the duty by as much: by a twentieth of it, less than another source is told by
-    let least = (20.0 * duty_accuracy(p.f_sw)).max(LEAST_DUTY);
-    let rows = (0..record.rows()).filter_map(|row| {
-        let (v, d, load) = (record.measured[0][row], record.duty[row], &record.load[row]);
-        let drawn = ideal::drawn(load, v);
-        let losses = model.plant.inductor.dcr * ideal.inductor(drawn, d) + model.plant.switch.v_f * (1.0 - d);
-        // at a duty of 1 a boost holds no voltage
-        let is_told = v.is_finite() && ideal.never_rests(drawn, d) && (least..1.0 - least).contains(&d);
-        is_told.then(|| ideal.source(v, d, losses))
-    });
-    let rows: Vec<f64> = rows.collect();
-    (2 * rows.len() > record.rows())
-        .then(|| median(rows))
-        .filter(|v| v.is_finite())
-}
-
-/// Records that seem to come from another source than the training records.
-pub fn sources(train: &[Record], held: &[Record], model: &Model) -> Vec<String> {
-    let shown = |record: &Record| Some(shown_source(record, model)? / record.v_in_ratio);
-    let usual = median(train.iter().filter_map(shown));
-    let odd = |record: &Record| {
-        let ratio = shown(record)? / usual;
-        // a record that has its own source voltage needs no word
-        ((ratio - 1.0).abs() > OTHER_SOURCE && record.v_in_ratio == 1.0).then(|| {
-            let v_in = format!("{:.4}", model.plant.converter.v_in * ratio).trim_end_matches('0').trim_end_matches('.').to_owned();
-            format!(
-                "{0}: looks like a source of about {v_in} V, {1:+.0} % beside the training records'; if it was set so, say it in a map file: \
-                 [records.{0}] constants = {{ v_in = {v_in} }}",
-                record.name,
-                100.0 * (ratio - 1.0)
-            )
-        })
-    };
-    train.iter().chain(held).filter_map(odd).collect()
 }
 
 /// Held-out records that are training records again: both names.

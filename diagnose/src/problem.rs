@@ -12,6 +12,7 @@ use crate::capture::terms::Drive;
 use crate::causes::{Bases, Knob};
 use crate::drive::{Begin, Model, Start, Unseen, simulate_counted};
 use crate::flicker;
+use crate::left_out;
 use crate::noise::Outlier;
 use crate::record::{CHANNELS, LOAD_CURRENT, Record};
 use crate::work::Work;
@@ -141,6 +142,11 @@ fn in_steps(record: &Record) -> [Vec<bool>; CHANNELS] {
     for channel in &mut masked {
         if channel.iter().filter(|row| **row).count() as f64 > most {
             channel.fill(false);
+        }
+    }
+    for rows in left_out::ends(record) {
+        for channel in &mut masked {
+            channel[rows.clone()].fill(true);
         }
     }
     masked

@@ -8,6 +8,7 @@ mod digits;
 pub(crate) mod edges;
 mod exchanged;
 mod levels;
+mod load_unit;
 mod logged;
 mod raw;
 mod rows;

@@ -135,6 +135,7 @@ fn a_load_that_slopes_from_level_to_level_is_one_step_inside_a_period() {
     for noise in [0.02, 0.05] {
         let found = diagnosed(&slopes(), noise);
         assert_eq!(found.findings.verdict, Verdict::Consistent, "noise {noise} A");
+        println!("{}", found.findings.sentence);
         let notes = found.findings.noise.repairs.join("\n");
         for wanted in [
             "a load current in 5 stretches at rest, with",
@@ -166,6 +167,7 @@ fn a_duty_step_at_a_resistor_is_no_step_of_the_load() {
     };
     let found = diagnosed(&bench, 0.1);
     assert_eq!(found.findings.verdict, Verdict::Consistent);
+    println!("{}", found.findings.sentence);
     let notes = found.findings.noise.repairs.join("\n");
     assert!(
         notes.contains("i_out is taken for a resistor in 1 stretch at rest"),
@@ -230,6 +232,7 @@ fn instants_that_end_at_their_limit_are_said() {
     let table = bench.run().without(&["i_out", "v_in"]).with("i_load", late);
     let record = table.measured(&columns, &mut Noise(3)).read("bench", &model()).unwrap();
     let found = diagnose(&model(), vec![record], &[], &|_| ());
+    println!("{}", found.findings.sentence);
     let notes = found.findings.noise.repairs.join("\n");
     assert!(
         notes.contains("end at the limit of one period"),

@@ -9,9 +9,9 @@ use bench::{Bench, Noise, Table, Wiring, model, of};
 use diagnose::drive::Model;
 use diagnose::fit::State;
 use diagnose::noise;
-use diagnose::preflight;
 use diagnose::problem::Problem;
 use diagnose::record::Record;
+use diagnose::{preflight, supply};
 
 const ROWS: usize = 150;
 
@@ -328,12 +328,12 @@ fn a_held_out_record_at_another_source_is_named_with_its_map() {
     };
     let mut table = made(&low, &mut random).without(&["v_in"]);
     let held = [read("second", &table)];
-    let said = preflight::sources(&train, &held, &Model::new(&model()));
+    let said = supply::sources(&train, &held, &Model::new(&model()));
     assert_eq!(said.len(), 1, "{said:?}");
     assert!(said[0].contains("[records.second] constants = { v_in = 1"), "{said:?}");
     table = clean(&mut random);
     let held = [read("second", &table)];
-    assert!(preflight::sources(&train, &held, &Model::new(&model())).is_empty());
+    assert!(supply::sources(&train, &held, &Model::new(&model())).is_empty());
 }
 
 #[test]

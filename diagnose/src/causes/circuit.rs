@@ -1,17 +1,25 @@
 //! What the circuit itself has wrong: switch, inductor, output capacitor.
 
-use super::knob::Reach;
+use super::knob::{Knob, Reach};
 use super::list::{EDGE, OHMS, form, knob, scaled, searched};
 use super::{Cause, Kind, Search};
 
 pub(super) const DCR: Cause = Cause {
     id: "dcr",
     kind: Kind::Part,
-    forms: &[form(
-        "resistance of the winding",
-        &[knob("dcr", &["inductor.dcr"], OHMS)],
-    )],
+    forms: &[
+        form("resistance of the winding", &[knob("dcr", &["inductor.dcr"], OHMS)]),
+        // settled points stand long enough to warm it
+        form("resistance of the winding as it warms", &[WARMS]),
+        form(
+            "resistance of the winding, cold and as it warms",
+            &[knob("dcr", &["inductor.dcr"], OHMS), WARMS],
+        ),
+    ],
 };
+
+/// As far as the resistance itself, at the usual current.
+const WARMS: Knob = knob("heating", &["inductor.heating"], Reach::RiseOfResistance(0.5, 0.005));
 
 pub(super) const R_DS_ON: Cause = Cause {
     id: "r_ds_on",

@@ -28,6 +28,8 @@ pub(crate) enum Reach {
     Own(f64, f64, f64),
     /// In units of v / i: highest and step.
     Resistance(f64, f64),
+    /// Of what a resistance rises by with the square of a current, in units of v / i^3: highest and step.
+    RiseOfResistance(f64, f64),
     /// Of the source, in units of v / i, or of 0.4 v_in^2 / (v i) where that is more: of what the converter is to its source, which the load
     /// is behind a converter that steps far down. Lowest, highest and step.
     SourceResistance(f64, f64, f64),
@@ -220,6 +222,7 @@ impl Knob {
             // for numbers that every converter has: shares of a 0 would leave no room
             Reach::Own(low, high, step) => by(own, low, high, step),
             Reach::Resistance(high, step) => by(bases.v / bases.i, 0.0, high, step),
+            Reach::RiseOfResistance(high, step) => by(bases.v / bases.i.powi(3), 0.0, high, step),
             Reach::SourceResistance(low, high, step) => {
                 let seen = bases.v_in * bases.v_in / (bases.v * bases.i);
                 by((bases.v / bases.i).max(SEEN * seen), low, high, step)

@@ -134,11 +134,15 @@ impl Raw<'_> {
                 self.repairs.push(found.words);
                 (lines.load, lines.metered, lines.levels) = (found.load, Some(found.noise), found.levels);
             }
-            None => self.repairs.push(
+            None => {
+                // nothing of its noise is taken away, and it is the load all the same
+                lines.metered = Some(0.0);
+                self.repairs.push(
                 "i_out is taken for the load as it was measured, noise and all: it is neither levels nor straight lines with white \
                  noise. A column i_load or r_load of what was set drives the model better"
                     .to_owned(),
-            ),
+            );
+            }
         }
     }
 

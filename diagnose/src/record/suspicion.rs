@@ -5,6 +5,7 @@ use toml_input::Message;
 
 use super::channels::{CHANNEL_UNITS, CHANNELS, QUANTITIES};
 use super::exchanged;
+use super::load_unit;
 use super::source::Source;
 use super::steady::{self, Beside};
 use super::still;
@@ -60,6 +61,9 @@ pub fn of(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]
         return turned;
     }
     let labels: [&str; CHANNELS] = std::array::from_fn(|n| sources[n].label.as_str());
+    if let Some(message) = load_unit::suspected(record, parameters) {
+        return vec![message];
+    }
     let mut odd = sized(record, parameters, &labels);
     if odd.is_empty() {
         odd = exchanged_voltages(record, parameters, sources);
@@ -394,7 +398,7 @@ fn sized(record: &Record, parameters: &Parameters, labels: &[&str; CHANNELS]) ->
 }
 
 /// What the model has on average: nothing where that is too small or unknown.
-fn sizes(record: &Record, parameters: &Parameters) -> [Option<f64>; CHANNELS] {
+pub(super) fn sizes(record: &Record, parameters: &Parameters) -> [Option<f64>; CHANNELS] {
     let ideal = Ideal::of(record, parameters);
     let duty = typical(&record.duty).filter(|duty| *duty > LEAST);
     let v_o = duty.map(|duty| ideal.volts(duty)).filter(|volts| volts.is_finite());
@@ -417,7 +421,7 @@ pub fn typical(values: &[f64]) -> Option<f64> {
     (middle > 0.0).then_some(middle)
 }
 
-fn ratio(a: f64, b: f64) -> f64 {
+pub(super) fn ratio(a: f64, b: f64) -> f64 {
     (a / b).max(b / a)
 }
 
@@ -425,6 +429,6 @@ fn shown_in(value: f64, unit: &str) -> String {
     report::quantity(value, unit, 3)
 }
 
-fn shown(value: f64) -> String {
+pub(super) fn shown(value: f64) -> String {
     report::quantity(value, "", 3)
 }

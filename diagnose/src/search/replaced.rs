@@ -6,6 +6,8 @@ use crate::progress;
 
 /// Candidates that are tried as rivals of a cause beside others. A convention: each costs a fit.
 const MOST_RIVALS: usize = 8;
+/// The cause that both switches in proportion are almost.
+const WINDING: &str = "dcr";
 
 impl Searcher<'_> {
     /// Fits of the set with other causes in the place of one: those that are `chosen` of what gains a share of the most at first order, where
@@ -62,6 +64,16 @@ impl Searcher<'_> {
         chosen
     }
 
+    /// What may stand in the place of `own`, and of a winding both switches in proportion: beside others they are not tried for themselves, since they are
+    /// almost the winding. So they tie with it.
+    fn with_both_switches(&self, own: usize, mut chosen: Vec<usize>) -> Vec<usize> {
+        if self.id(own) == WINDING {
+            let both = |cause: &usize| self.fitter.candidates[*cause].is_in_proportion();
+            chosen.extend((0..self.fitter.candidates.len()).filter(both));
+        }
+        chosen
+    }
+
     /// For each cause of a set, what explains the data as well in its place.
     pub fn rivals(&self, best: &Fit, evidence: &[f64], singles: &[Fit]) -> Vec<Vec<Fit>> {
         let members = best.causes.iter().enumerate();
@@ -75,7 +87,10 @@ impl Searcher<'_> {
                 // a cause that ended better than alone did so from elsewhere, and from there its rivals may end better as well
                 let is_met = |fit: &Fit| fit.causes == best.causes && fit.state.chi2 <= best.state.chi2 + tolerance;
                 if !all.iter().any(is_met) {
-                    let chosen = |looks| self.with_others_of_edges(*own, top(self.of_each_cause(looks), MOST_RIVALS));
+                    let chosen = |looks| {
+                        let usual = top(self.of_each_cause(looks), MOST_RIVALS);
+                        self.with_both_switches(*own, self.with_others_of_edges(*own, usual))
+                    };
                     let stage = format!("rivals of {}", self.id(*own));
                     all.extend(self.replacements(best, member, chosen, &stage));
                 }

@@ -101,6 +101,20 @@ fn impossible() -> Vec<Case> {
             None,
         ),
         (
+            "load in kiloohms",
+            column(5, times(1e-3)).into_bytes(),
+            "r_load is not in ohm",
+            None,
+        ),
+        (
+            "load in milliamperes",
+            column(5, |_| "5000".to_owned())
+                .replace("r_load", "i_load")
+                .into_bytes(),
+            "i_load is not in A",
+            None,
+        ),
+        (
             "input in millivolts",
             column(4, times(1e3)).into_bytes(),
             "v_in is not in V",

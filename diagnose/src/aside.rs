@@ -12,7 +12,7 @@
 //! does not speak against it.
 
 use crate::attribute::SURE;
-use crate::causes::Kind;
+use crate::causes::{Cause, Kind};
 use crate::doubts::Doubt;
 use crate::drive::Model;
 use crate::examine::{Examined, examined};
@@ -43,6 +43,9 @@ const FEWEST_RECORDS: usize = 2;
 /// The causes may make what was set aside this much worse, in squares, since what disturbs it may run against them: an effect and a
 /// disturbance of one size that follow each other to .6 do so by 1.25. A convention above it.
 const WORSE: f64 = 1.5;
+
+/// The channel that shows the curve of an inductor by itself.
+const INDUCTOR_CURRENT: usize = 1;
 
 /// A part of the records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -283,9 +286,10 @@ fn helps(pair: &Pair, found: &Examined) -> bool {
 }
 
 /// Whether one channel is enough to tell of the causes, where no other is left beside the one that was set aside: only with a held-out record, and of
-/// records that are read as they were made. Not of an instrument, which would be the one that is left. Nor of a part's curve: where that is another than the
-/// law's it bends to the one channel, and the other shows it. In the held-out record the other may be off by more, since what disturbs it may run
-/// against the causes, but a cause that takes it much further off is one of a bent fit.
+/// records that are read as they were made (a duty that waits is a shift of rows as well). Not of an instrument, which would be the one that is left. Nor of
+/// an inductor's curve where its current is set aside: where that is another than the law's it bends to the voltage, and the current shows it. In the
+/// held-out record the other channel may be off by more, since what disturbs it may run against the causes, but a cause that takes it much further off is
+/// one of a bent fit.
 fn tells_alone(part: Part, found: &Examined, whole: &Examined, heldout: &[Record], base: &Model) -> bool {
     let Part::Channel(n) = part else { return true };
     let others = (0..CHANNELS).filter(|other| *other != n && whole.problem.sigma[*other].is_finite());
@@ -293,10 +297,15 @@ fn tells_alone(part: Part, found: &Examined, whole: &Examined, heldout: &[Record
         return true;
     }
     let attribution = &found.attribution;
-    let mut causes =
-        (attribution.best.iter().flat_map(|best| &best.causes)).map(|cause| &attribution.candidates[*cause]);
-    let is_odd = |doubt: &Doubt| matches!(doubt, Doubt::Bench(_));
-    if whole.doubts.iter().any(is_odd) || causes.any(|one| one.is_curve() || one.cause.kind == Kind::Instrument) {
+    let causes = attribution.best.iter().flat_map(|best| &best.causes);
+    let causes: Vec<&'static Cause> = causes.map(|cause| attribution.candidates[*cause].cause).collect();
+    let is_misread = whole.doubts.iter().any(|doubt| matches!(doubt, Doubt::Bench(_)));
+    let is_odd = |cause: &&Cause| {
+        let is_late = cause.id == "duty_delay";
+        let is_of_current = cause.id == "l_saturation" && n == INDUCTOR_CURRENT;
+        is_misread && !is_late || is_of_current || cause.kind == Kind::Instrument
+    };
+    if causes.iter().any(is_odd) {
         return false;
     }
     let state = attribution.state();

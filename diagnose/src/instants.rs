@@ -252,10 +252,14 @@ pub(crate) fn note(problem: &mut Problem, starts: &Starts) {
             });
         if !late.is_empty() {
             record.repairs.push(format!(
-                "{} inside a switching period, {low:+.2} to {high:+.2} periods from where the table has {}",
+                "{} inside a switching period, {} periods from where the table has {}",
                 match late.len() {
                     1 => "1 load step is taken to lie".to_owned(),
                     more => format!("{more} load steps are taken to lie"),
+                },
+                match late.len() {
+                    1 => format!("{low:+.2}"),
+                    _ => format!("{low:+.2} to {high:+.2}"),
                 },
                 if late.len() == 1 { "it" } else { "them" },
             ));

@@ -316,10 +316,13 @@ pub fn nearest(partial: &[Named], removed: f64, fits_training: bool, left: &[Str
                 true => ", but a part whose curve is not one of the law's looks like this: check it first",
                 false => "",
             };
+            let away = match removed < 0.005 {
+                true => "nothing of the error above the noise".to_owned(),
+                false => format!("{:.0} % of the error above the noise", 100.0 * removed),
+            };
             format!(
-                " Nearest comes {}{rest}. That takes away {:.0} % of the error above the noise: too little for an explanation{but}.",
-                list.join("; with "),
-                100.0 * removed
+                " Nearest comes {}{rest}. That takes away {away}: too little for an explanation{but}.",
+                list.join("; with ")
             )
         }
     }

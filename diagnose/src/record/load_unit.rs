@@ -4,15 +4,14 @@ use plant::{Load, Parameters};
 use toml_input::Message;
 
 use super::Record;
-use super::suspicion::{ratio, shown, sizes, typical};
+use super::channels::QUANTITIES;
+use super::suspicion::{OTHER_UNIT, ratio, shown, sizes, typical};
 use crate::ideal::Ideal;
 
 /// A thousand: milli and kilo.
 const UNIT: f64 = 1000.0;
 /// A current is the load's within this ratio: ripple at the sampling instant, losses, and what the rest of the load draws.
 const NEAR: f64 = 1.6;
-/// A current that is off by less is in its unit: the geometric mean of ten and a hundred, as for the channels.
-const OTHER_UNIT: f64 = 30.0;
 
 /// A part of the load: its quantity, its unit, and what it draws at a voltage, A.
 type Part = (&'static str, &'static str, fn(&Load, f64) -> f64);
@@ -54,7 +53,7 @@ pub(super) fn suspected(record: &Record, parameters: &Parameters) -> Option<Mess
         // a resistance that draws less is a larger one
         let prefix = if *name == "r_load" { "k" } else { "m" };
         let (n, found) = currents[0];
-        let channel = ["v_out", "i_l", "i_out"][n];
+        let channel = QUANTITIES[n];
         Some(
             Message::new(format!("{name} is not in {unit}"))
                 .found(format!("a load of about {} A", shown(drawn)))

@@ -15,7 +15,7 @@ use crate::median::median;
 
 /// A signal this many times larger or smaller than the model's is in another unit: units are a thousand apart, percent a hundred,
 /// and operating points of one converter less than ten. About the geometric mean of ten and a hundred.
-const OTHER_UNIT: f64 = 30.0;
+pub(super) const OTHER_UNIT: f64 = 30.0;
 /// Two signals are exchanged if each is this far from its own size and (conventions: no bench is 60 % off its model in two signals at
 /// once, and one that is 30 % off is no longer near) ...
 const FAR: f64 = 1.6;

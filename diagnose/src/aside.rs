@@ -252,9 +252,14 @@ fn above(problem: &Problem, state: &State, counts: impl Fn(usize, usize) -> bool
 /// What the best of the causes that lead leaves above the noise where channel `n` is not compared.
 fn left_by_one_cause(whole: &Examined, n: usize) -> f64 {
     let attribution = &whole.attribution;
+    // what disturbs a channel bends the instants of load steps as well: they are sought anew without it
+    let listed = instants::as_listed(&whole.problem);
+    let model = &attribution.null.model;
+    let null = State::settle(&listed, model, &listed.first_starts(model), None);
     let fitter = Fitter {
         effort: ROUGH,
-        ..attribution.fitter(&whole.problem)
+        null: &null,
+        ..attribution.fitter(&listed)
     };
     let WithoutChannel {
         problem, null, fits, ..
@@ -299,7 +304,10 @@ fn tells_alone(part: Part, found: &Examined, whole: &Examined, heldout: &[Record
     let attribution = &found.attribution;
     let causes = attribution.best.iter().flat_map(|best| &best.causes);
     let causes: Vec<&'static Cause> = causes.map(|cause| attribution.candidates[*cause].cause).collect();
-    let is_misread = whole.doubts.iter().any(|doubt| matches!(doubt, Doubt::Bench(_)));
+    // what the instrument that is set aside may do by itself is no other reading of what is left
+    let is_its_own =
+        |words: &String| (whole.misread.iter()).any(|one| one.words == *words && one.may_be_an_instrument(n));
+    let is_misread = (whole.doubts.iter()).any(|doubt| matches!(doubt, Doubt::Bench(words) if !is_its_own(words)));
     let is_odd = |cause: &&Cause| {
         let is_late = cause.id == "duty_delay";
         let is_of_current = cause.id == "l_saturation" && n == INDUCTOR_CURRENT;

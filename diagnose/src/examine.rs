@@ -52,6 +52,8 @@ pub struct Examined {
     pub odd: Vec<String>,
     /// Other readings of single records, of those in `odd`: what held-out records speak against may be one of them.
     pub readings: Vec<String>,
+    /// Other ways to read the records.
+    pub misread: Vec<Misread>,
     /// The channel or record without which the model as given explains the records, and what its edges do beside it.
     pub all_but: Option<(String, Option<String>)>,
     /// The answer.
@@ -140,6 +142,7 @@ pub fn examined(train: Vec<Record>, base: &Model, work: &Work, say: Listener<'_>
         doubts,
         outliers,
         readings: readings(&misread, &odd),
+        misread,
         odd,
         all_but: None,
     }
@@ -192,6 +195,7 @@ impl Examined {
             outliers,
             odd: Vec::new(),
             readings: Vec::new(),
+            misread: Vec::new(),
             all_but: None,
         }
     }

@@ -114,6 +114,13 @@ fn free(problem: &Problem, steps: &[Vec<LoadStep>]) -> Option<Problem> {
     (count(&freed) > 0).then_some(freed)
 }
 
+/// The problem with all load steps where the table has them.
+pub(crate) fn as_listed(problem: &Problem) -> Problem {
+    let mut listed = problem.clone();
+    listed.records.iter_mut().for_each(|record| record.free_steps.clear());
+    listed
+}
+
 /// Number of free instants.
 pub(crate) fn count(problem: &Problem) -> usize {
     problem.records.iter().map(|record| record.free_steps.len()).sum()

@@ -69,6 +69,16 @@ impl Misread {
         }
     }
 
+    /// Whether it is nothing but what the instrument of channel `n` may do by itself: another source does to the voltage what a gain does.
+    #[must_use]
+    pub fn may_be_an_instrument(&self, n: usize) -> bool {
+        match self.reading {
+            Reading::Source(_) => n == 0,
+            Reading::Probe(channel, _) => channel == n,
+            _ => false,
+        }
+    }
+
     /// Whether a cause that explains the records speaks against it: the record cannot be both.
     #[must_use]
     pub fn is_refuted_by_a_cause(&self) -> bool {

@@ -3,9 +3,10 @@
 //! What an instrument of no list does to its channel bends the causes that are fitted to all, and a search that goes on then fits sets of three to it. So
 //! does a second cause that acts on one channel alone: from where the first fits the others, it is what is left.
 
-use super::{LOOKED_AT, Searcher};
+use super::{Known, LOOKED_AT, Searcher, Set};
 use crate::aside::may_miss;
 use crate::attribute::SURE;
+use crate::causes::Search;
 use crate::fit::{Fit, Fitter, State};
 use crate::level::threshold;
 use crate::noise;
@@ -53,7 +54,8 @@ impl WithoutChannel {
                 begun.push((cause, values));
             }
         }
-        let fits = parallel::map(&begun, |(cause, values)| own.from(&[*cause], values, &null));
+        let mut fits = parallel::map(&begun, |(cause, values)| own.from(&[*cause], values, &null));
+        fits.extend(counters(&own));
         WithoutChannel {
             channel: n,
             problem,
@@ -74,6 +76,19 @@ impl WithoutChannel {
                     .any(is_elsewhere)
         })
     }
+}
+
+/// Counters of the duty, sought anew: no fit goes from one number of counts to another.
+fn counters(fitter: &Fitter<'_>) -> Vec<Fit> {
+    let search = Searcher {
+        fitter: Fitter { ..*fitter },
+        say: &|_| (),
+        known: Known::default(),
+    };
+    let all = 0..fitter.candidates.len();
+    all.filter(|cause| matches!(search.search(*cause), Search::Counter(_)))
+        .map(|cause| search.added(&Set::NONE, cause, fitter.null))
+        .collect()
 }
 
 /// The causes of a set with their values.

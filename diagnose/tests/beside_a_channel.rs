@@ -1,0 +1,42 @@
+//! Counters of the duty beside a channel that something else disturbs: cases of the generator of blind cases, which shares no code with the plant.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod folder;
+
+use diagnose::findings::Verdict;
+use folder::{findings, ids};
+
+/// The counter of `step` is named in `folder`, and `channel` is set aside.
+fn is_named(folder: &str, channel: &str, step: f64) {
+    let findings = findings(folder, &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::MostlyExplained, "{}", findings.sentence);
+    assert_eq!(ids(&findings), ["duty_quantisation"], "{}", findings.sentence);
+    assert_eq!(findings.set_aside.as_ref().unwrap().channel, Some(channel));
+    let found = &findings.causes[0].parameters["duty_lsb"];
+    assert!(
+        found.low < 1.0002 * step && found.high > 0.9998 * step,
+        "{} to {}",
+        found.low,
+        found.high
+    );
+}
+
+/// The voltmeter is off by the cube of what it shows, so that one record looks like one of another source; the current shows that it is none.
+#[test]
+fn a_voltage_that_looks_like_another_source_is_set_aside() {
+    is_named("counter_beside_v_out", "v_o", 1.805_309e-2);
+}
+
+/// A current that creeps bends the instants of the load steps, and beside those no counter leads.
+#[test]
+fn a_creeping_current_does_not_hide_a_counter() {
+    is_named("counter_beside_i_l", "i_l", 7.729_545e-3);
+}
+
+/// Ten levels of the duty, which a counter that cuts off fits a little better than the one that rounds, and with 5 ns of dead time better still. The
+/// held-out record is five times as far from these as its noise.
+#[test]
+fn a_counter_that_rounds_is_tried_where_one_that_cuts_off_does_not_hold() {
+    is_named("counter_cut_or_rounded", "i_o", 7.517_986e-3);
+}

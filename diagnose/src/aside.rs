@@ -214,11 +214,10 @@ fn parts(whole: &Examined, state: &State, structure: &[Structure]) -> Vec<Part> 
     let runs = (0..problem.records.len())
         .filter(|_| problem.records.len() > FEWEST_RECORDS)
         .map(Part::Record);
-    let has_structure = |part: &Part| {
-        structure.iter().any(|one| match part {
-            Part::Channel(n) => one.channel == CHANNEL_NAMES[*n],
-            Part::Record(index) => one.record == problem.records[*index].name,
-        })
+    // a channel may be what the causes bent to, and leave something in the others
+    let has_structure = |part: &Part| match part {
+        Part::Channel(_) => true,
+        Part::Record(index) => structure.iter().any(|one| one.record == problem.records[*index].name),
     };
     let total = above(problem, state, |_, _| true);
     let left = |part: Part| {

@@ -68,7 +68,11 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
         known,
         ..searcher(&problem, &candidates, &basis, &null, say)
     };
-    let Some(inside) = Inside::needed(&search, &singles) else {
+    // beside what no cause has come near to within the budget, instants help none
+    let inside = (problem.work.goes_on())
+        .then(|| Inside::needed(&search, &singles))
+        .flatten();
+    let Some(inside) = inside else {
         let found = search.grow(&singles);
         let attribution = completed(&search, singles, found);
         return (problem, attribution);
@@ -128,7 +132,12 @@ fn beside_instants(
         }
     }
     let begun: Vec<Fit> = free_singles.iter().chain(&inside.set).cloned().collect();
-    let found = free.grow(&begun);
+    let mut found = free.grow(&begun);
+    if found.0.is_none() && !is_alone && search.fitter.problem.work.goes_on() {
+        // what leads where the table has the steps may do nothing beside free ones, and another cause all
+        free_singles = free.singles("load steps inside a period: each cause alone");
+        found = free.grow(&free_singles);
+    }
     // two causes together may have looked like instants, as long as one of them was missing; rivals take the longest, and are sought once
     let as_listed = found.0.as_ref().map(|best| search.refitted(best));
     match (as_listed, &found.0) {

@@ -10,6 +10,7 @@ use crate::capture::estimates::{self, Driven, Estimates};
 use crate::capture::terms::delays;
 use crate::compared;
 use crate::control::Request;
+use crate::counters;
 use crate::doubts;
 use crate::drive::Model;
 use crate::empirical::{self, Described};
@@ -93,10 +94,9 @@ pub fn diagnose_knowing(
     let mut pair = found.judged(heldout, &base);
     // with the carrier that was found
     let taken = found.problem.base.clone();
-    let aside = match aside::explained_without(&kept, &found, heldout, &taken, say) {
-        Some(rest) => put_aside(rest, &mut found, &mut pair),
-        None => None,
-    };
+    let rest = aside::explained_without(&kept, &found, heldout, &taken, say);
+    let aside = rest.and_then(|rest| put_aside(rest, &mut found, &mut pair));
+    found.widen_counter(heldout, &taken);
     let explained = found.verdict != Verdict::Unexplained;
     let (state, trim) = better(&found, model.converter.f_sw);
     let mut answer = answer(&found, pair.as_ref(), &state, sources, say);
@@ -447,6 +447,7 @@ fn notes(found: &Examined, pair: Option<&Pair>) -> Vec<String> {
     notes.extend(words::edges(found).filter(|_| found.verdict != Verdict::Consistent || !found.lines.is_empty()));
     notes.extend(words::curves(found));
     notes.extend(words::drawn_beside(found));
+    notes.extend(counters::note(attribution, &found.profiles).filter(|_| found.verdict != Verdict::Unexplained));
     notes.extend(words::pulsed(found).filter(|_| found.verdict != Verdict::Unexplained));
     notes.extend(resistors::note(attribution).filter(|_| found.verdict != Verdict::Unexplained));
     // of what was found: where the model as given is far off, so are the instants of load steps that fit it best

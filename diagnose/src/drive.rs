@@ -165,7 +165,7 @@ pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>
     p.pwm.sampling_phase = phase;
     let driver = Driver {
         record,
-        load: shifted_load(record, begin.levels, &model.resistors),
+        load: shifted_load(record, begin.levels, &model.resistors, &p.sensors.v_out),
         whole: whole as isize,
         phase,
         steps: record
@@ -182,7 +182,8 @@ pub(crate) fn simulate_counted(model: &Model, record: &Record, begin: &Begin<'_>
     for (segment, start) in record.segments.iter().zip(begin.states) {
         if p.source.ripple > 0.0 {
             // the plant's time starts at 0 with each segment, the line's phase does not
-            let turns = model.plant.source.ripple_phase + p.source.ripple_frequency * record.time[segment.start];
+            let turns = model.plant.source.ripple_phase
+                + p.source.ripple_frequency * (record.time[segment.start] + record.clock);
             p.source.ripple_phase = turns - turns.floor();
         }
         // a fit may try numbers that are no converter: NaN costs it that step, and not the diagnosis
@@ -299,7 +300,7 @@ struct Driver<'a> {
 /// The load between two samples: what is drawn first, what then, and the share of the time at which it changes.
 struct Drawn<'a>(&'a Load, &'a Load, f64);
 
-/// Rows by which a free load step is apart from any other change of the load and from the ends of its segment: it may
+/// Rows by which a free load step is apart from changes of the load that are not free, and from the ends of its segment: it may
 /// lie a period to either side, and the samples by another one.
 pub(crate) const FREE_APART: usize = 4;
 
@@ -345,16 +346,20 @@ impl Driver<'_> {
     /// The load before the sample of row `n`, where a free step is near.
     fn moved(&self, n: usize) -> Option<Drawn<'_>> {
         let near = |step: &&(usize, f64)| self.period(n).abs_diff(step.0) < FREE_APART;
-        let (row, late) = *self.steps.iter().find(near)?;
+        let mut near = self.steps.iter().filter(near).peekable();
         let load = &self.load;
-        let (old, new) = (load.get(row.checked_sub(1)?)?, load.get(row)?);
-        // the sample of row n is taken at n + whole + phase, in periods of the record
-        let since = row as f64 + late - (self.whole as f64 + self.phase) - (n as f64 - 1.0);
-        Some(if since <= 0.0 {
-            Drawn(new, new, 1.0)
-        } else {
-            Drawn(old, new, since)
-        })
+        // what is drawn before the first of them
+        let mut drawn = load.get(near.peek()?.0.checked_sub(1)?)?;
+        for (row, late) in near {
+            let new = load.get(*row)?;
+            // the sample of row n is taken at n + whole + phase, in periods of the record
+            let since = *row as f64 + late - (self.whole as f64 + self.phase) - (n as f64 - 1.0);
+            if since > 0.0 {
+                return Some(Drawn(drawn, new, since));
+            }
+            drawn = new;
+        }
+        Some(Drawn(drawn, drawn, 1.0))
     }
 
     /// Whether a row is the settled point of the row before again, which need not be sought twice.
@@ -375,10 +380,18 @@ impl Driver<'_> {
     }
 }
 
-/// The load of a record whose free levels are off by so many standard deviations, and whose resistors are other than printed.
-fn shifted_load<'a>(record: &'a Record, levels: &[f64], resistors: &[Resistor]) -> Cow<'a, [Load]> {
+/// The load of a record whose free levels are off by so many standard deviations, whose resistors are other than printed, and whose voltage is shown by
+/// `voltmeter`. A conductance that was read off two meters is that of what they show: a current of `G (gain v + offset)` at the true voltage `v`.
+fn shifted_load<'a>(
+    record: &'a Record,
+    levels: &[f64],
+    resistors: &[Resistor],
+    voltmeter: &plant::Sensor,
+) -> Cow<'a, [Load]> {
     let are_off = resistors::are_off(resistors);
-    if levels.iter().all(|by| *by == 0.0) && !are_off {
+    let (gain, offset) = (voltmeter.gain, voltmeter.offset);
+    let is_read_off = record.metered.is_some() && (gain, offset) != (1.0, 0.0);
+    if levels.iter().all(|by| *by == 0.0) && !are_off && !is_read_off {
         return Cow::Borrowed(&record.load);
     }
     let mut load = record.load.clone();
@@ -387,6 +400,10 @@ fn shifted_load<'a>(record: &'a Record, levels: &[f64], resistors: &[Resistor]) 
     }
     for (level, by) in record.free_levels.iter().zip(levels) {
         level.shift(&mut load, *by);
+    }
+    for load in load.iter_mut().filter(|load| is_read_off && load.conductance > 0.0) {
+        load.current += offset * load.conductance;
+        load.conductance *= gain;
     }
     Cow::Owned(load)
 }

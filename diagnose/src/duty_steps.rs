@@ -1,12 +1,14 @@
 //! Which steps of a duty counter could have made a residual: the response to the rounding of the duty, by the averaged
 //! circuit linearised around each row, for thousands of steps.
 
+mod alike;
 mod gains;
 mod pieces;
 mod responses;
 
 use plant::Parameters;
 
+pub(crate) use self::alike::{Alike, alike};
 use self::gains::Gains;
 use self::pieces::Piece;
 use self::responses::LANES;

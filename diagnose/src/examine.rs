@@ -2,6 +2,7 @@
 
 use crate::attribute::{Attribution, attribute, without_search};
 use crate::balance;
+use crate::clocks;
 use crate::doubts::{self, Doubt};
 use crate::drive::Model;
 use crate::fast;
@@ -348,6 +349,10 @@ fn prepared(train: Vec<Record>, base: &Model, work: &Work) -> (Problem, State, V
     null = State::settle(&problem, base, &null.starts, None);
     problem.sigma = noise::sigma(&problem, &null.residual);
     null = State::settle(&problem, base, &null.starts, None);
+    let is_tuned = clocks::tune(&mut problem, base, null.starts.trim, 1);
+    if clocks::align(&mut problem, &null) || is_tuned {
+        null = State::settle(&problem, base, &null.starts, None);
+    }
     (problem, null, outliers)
 }
 

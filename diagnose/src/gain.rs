@@ -4,6 +4,7 @@ use measured::DutyIs;
 use plant::Rectifier;
 
 use crate::balance;
+use crate::clocks;
 use crate::drive::Model;
 use crate::fit::State;
 use crate::ideal::{self, Ideal};
@@ -151,6 +152,7 @@ pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHA
     problem.trim_held = true;
     sampling::decide(&mut problem, extended);
     let mut remarks = other_chains(&mut problem, base, extended, trim);
+    clocks::tune(&mut problem, extended, trim, 0);
     let mut before = State::settle(&problem, base, &problem.first_starts(base), None);
     if sides::leave_out(&mut problem, &before) {
         before = State::settle(&problem, base, &before.starts, None);

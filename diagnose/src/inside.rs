@@ -102,12 +102,20 @@ impl Inside {
             let at = instants::scanned_in(&self.problem, &state.model, &state.starts, Some(&self.basis));
             (place, free.fitter.first_steps(causes, values, &at))
         };
-        let mut all: Vec<(usize, Fit)> = search.leaders(singles, LEADERS).into_iter().map(begun).collect();
+        let work = &self.problem.work;
+        // where the records are none of this converter each of these may take a third of the budget
+        let leaders = search.leaders(singles, LEADERS).into_iter();
+        let mut all: Vec<(usize, Fit)> = leaders.take_while(|_| work.goes_on()).map(begun).collect();
         let least = all.iter().map(|(_, fit)| fit.state.chi2).fold(f64::INFINITY, f64::min);
         for (_, fit) in all.iter_mut().filter(|(_, fit)| fit.state.chi2 < NEAR_THE_BEST * least) {
+            if !work.goes_on() {
+                break;
+            }
             *fit = free.fitter.from(&fit.causes, &fit.values, &fit.state);
         }
-        all.extend(self.of_edges(search));
+        if work.goes_on() {
+            all.extend(self.of_edges(search));
+        }
         all
     }
 

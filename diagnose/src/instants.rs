@@ -32,6 +32,8 @@ const NEGLIGIBLE: f64 = 0.05;
 pub(crate) const PRICE: f64 = 8.0;
 /// Most free steps of a record: each is one more simulation in a round of sensitivities. A convention for time.
 const MOST: usize = 64;
+/// Rows between two free steps at least: each lies up to a period to either side, and the one is over before the other.
+const CLOSEST: usize = 3;
 /// Instants that are looked at first, to either side: the fit then finds its way within an eighth of a period.
 const LOOKS: i32 = 8;
 
@@ -47,17 +49,22 @@ fn steps(record: &Record) -> Vec<LoadStep> {
         return Vec::new();
     }
     let all = flicker::steps(&record.load);
-    let alone = |step: &LoadStep| {
-        let mut others = all.iter().filter(|other| *other != step);
-        others.all(|other| step.first.abs_diff(other.last).min(other.first.abs_diff(step.last)) >= 2 * FREE_APART)
-    };
+    let apart = |one: &LoadStep, other: &LoadStep| one.first.abs_diff(other.last).min(other.first.abs_diff(one.last));
+    let alone = |step: &LoadStep, least: usize| all.iter().all(|other| other == step || apart(step, other) >= least);
     let inside = |step: &LoadStep| {
         let mut segments = record.segments.iter();
         segments.any(|s| s.start + FREE_APART <= step.first && step.last + TELLING <= s.end)
     };
-    let mut steps: Vec<LoadStep> = all.iter().copied().filter(|step| alone(step) && inside(step)).collect();
-    steps.truncate(MOST);
-    steps
+    let free: Vec<LoadStep> = (all.iter().copied())
+        .filter(|step| alone(step, CLOSEST) && inside(step))
+        .collect();
+    // what is not free has to be farther off
+    let is_fixed = |step: &LoadStep| !free.contains(step);
+    let is_clear = |step: &LoadStep| {
+        let mut fixed = all.iter().filter(|other| is_fixed(other));
+        fixed.all(|other| apart(step, other) >= 2 * FREE_APART)
+    };
+    free.iter().copied().filter(is_clear).take(MOST).collect()
 }
 
 /// The problem with free instants in the records that are much better with them, and where the model of `at` then stands; nothing
@@ -201,7 +208,7 @@ fn windows(problem: &Problem) -> Vec<(usize, usize, usize, usize)> {
             let next = record
                 .free_steps
                 .get(place + 1)
-                .map_or(end, |next| end.min(next - FREE_APART));
+                .map_or(end, |next| end.min(next - FREE_APART.min((next - row) / 2)));
             let of = |row: usize| problem.offsets[index] + row * CHANNELS;
             list.push((index, place, of(row - FREE_APART), of(next)));
         }

@@ -58,7 +58,8 @@ impl Examined {
         if let Some(chosen) = left_open::chosen(&self.problem, explained, heldout, base) {
             return Some(self.with_values(chosen));
         }
-        if let Some(pair) = self.counted_otherwise(heldout, base) {
+        let counted = self.counted_otherwise(heldout, base);
+        if let Some(pair) = counted.or_else(|| self.led_by_another_counter(heldout, base)) {
             return Some(pair);
         }
         self.verdict = Verdict::Unexplained;

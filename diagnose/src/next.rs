@@ -345,6 +345,7 @@ fn planned(problem: &Problem, plan: Plan) -> Planned {
         settled: false,
         repeated: false,
         scatter: [f64::NAN; CHANNELS],
+        clock: 0.0,
         metered: None,
         levels: Vec::new(),
         free_levels: Vec::new(),

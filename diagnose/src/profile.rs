@@ -11,7 +11,7 @@ use crate::problem::Problem;
 use crate::progress::{self, Listener};
 
 /// 95 % of a chi-square of one degree of freedom.
-const LEVEL: f64 = 3.841;
+pub(crate) const LEVEL: f64 = 3.841;
 /// The same in standard deviations.
 const TWO_SIDED: f64 = 1.96;
 /// Values that are tried beside those of [`PLACES`] until one lies near the end of an interval. A flat curve is doubled, to more than 16

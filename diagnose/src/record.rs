@@ -1,6 +1,7 @@
 //! A measured record as the plant can be driven by it: one row a control period, or settled points.
 
 mod align;
+mod beside_resistor;
 mod captured;
 mod channels;
 mod clipped;
@@ -42,6 +43,8 @@ pub struct Record {
     pub name: String,
     /// Time of each row, s; the row's number in a settled table.
     pub time: Vec<f64>,
+    /// How much later than the first record it began on the clock of a line on the source, s, but for whole turns.
+    pub clock: f64,
     /// Sampling instant as a fraction of the PWM period.
     pub phase: f64,
     /// Duty of the PWM period in which a row lies (starts, if sampled at its start).
@@ -145,6 +148,7 @@ impl Record {
             settled: lines.settled,
             repeated: lines.repeated,
             scatter: lines.scatter,
+            clock: 0.0,
             metered: lines.metered,
             levels: lines.levels,
             free_levels: Vec::new(),

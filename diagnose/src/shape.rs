@@ -11,7 +11,7 @@ use crate::noise::{self, BLOCK, channel};
 use crate::problem::Problem;
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, Record};
 use crate::small;
-use crate::spectrum::{Line, strongest_line};
+use crate::spectrum::{Line, strongest_line_of};
 use crate::words::si;
 pub(crate) use swing::{is_kicked, is_missing_elsewhere};
 
@@ -110,7 +110,7 @@ fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &
     let place = place(problem, state, (index, n), (values, excess));
     let of_line = |line: &Line| 0.5 * count * (line.amplitude / problem.sigma[n]).powi(2) / excess;
     let (course, words) = followed(problem, (index, n), values);
-    let line = strongest_line(problem, &state.residual, n).filter(|line| {
+    let line = strongest_line_of(problem, &state.residual, (index, n)).filter(|line| {
         let turns = line.frequency * record.rows() as f64 * problem.bases.t_sw;
         // of a turn that nobody sees the end of it is not known that it comes again
         let more = if turns < TURNS { MORE } else { 0.0 };

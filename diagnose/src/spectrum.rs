@@ -1,9 +1,11 @@
 //! Lines in a residual.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use crate::median::median;
 use crate::noise::channel;
+use crate::parallel;
 use crate::problem::Problem;
 
 /// Frequencies looked at, as shares of the sampling frequency: 20 Hz, below which a record of 25 ms holds half a turn, to 2 kHz at
@@ -27,16 +29,27 @@ pub struct Line {
 /// The strongest line of one channel over all records; nothing if the channel was not measured.
 #[must_use]
 pub fn strongest_line(problem: &Problem, residual: &[f64], n: usize) -> Option<Line> {
+    strongest_in(problem, residual, n, 0..problem.records.len())
+}
+
+/// The strongest line of one channel of a record: what an instrument picks up has a phase of its own in each.
+#[must_use]
+pub fn strongest_line_of(problem: &Problem, residual: &[f64], (index, n): (usize, usize)) -> Option<Line> {
+    strongest_in(problem, residual, n, index..index + 1)
+}
+
+fn strongest_in(problem: &Problem, residual: &[f64], n: usize, of: Range<usize>) -> Option<Line> {
     let mut samples = Vec::new();
     let (mut longest, t_sw) = (0.0f64, problem.bases.t_sw);
-    for (index, record) in problem.records.iter().enumerate().filter(|(_, r)| !r.settled) {
+    let records = problem.records.iter().enumerate();
+    for (index, record) in records.filter(|(index, r)| !r.settled && of.contains(index)) {
         let values = channel(problem, residual, index, n);
         samples.extend(
             values
                 .iter()
                 .zip(&record.time)
                 .filter(|(v, _)| **v != 0.0)
-                .map(|(v, t)| (*t, *v)),
+                .map(|(v, t)| (*t + record.clock, *v)),
         );
         longest = longest.max(record.rows() as f64 * t_sw);
     }
@@ -71,9 +84,139 @@ pub fn strongest_line(problem: &Problem, residual: &[f64], n: usize) -> Option<L
         frequency,
         amplitude: 2.0 * strength.sqrt() / n_samples * problem.sigma[n],
         phase: libm::atan2(cosine, sine) / TAU,
-        share: 2.0 * strength / n_samples / power.max(1e-300),
+        // of few turns a sine and a cosine are not at right angles
+        share: (2.0 * strength / n_samples / power.max(1e-300)).min(1.0),
     })
 }
+
+/// A sine in some samples beside their mean, by least squares: the sums of sine and cosine with each other and with the samples. Of few turns the two are
+/// not at right angles, and neither is their mean.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Wave {
+    ss: f64,
+    sc: f64,
+    cc: f64,
+    sv: f64,
+    cv: f64,
+}
+
+impl Wave {
+    /// Of samples (time, value) whose mean is 0.
+    fn of(samples: &[(f64, f64)], frequency: f64) -> Self {
+        let turned = samples.iter().map(|(t, v)| {
+            let turn = TAU * frequency * t;
+            (libm::sin(turn), libm::cos(turn), *v)
+        });
+        let (mut wave, mut means) = (Wave::default(), [0.0; 2]);
+        for (s, c, v) in turned {
+            wave.ss += s * s;
+            wave.sc += s * c;
+            wave.cc += c * c;
+            wave.sv += s * v;
+            wave.cv += c * v;
+            means[0] += s;
+            means[1] += c;
+        }
+        let count = samples.len().max(1) as f64;
+        wave.ss -= means[0] * means[0] / count;
+        wave.sc -= means[0] * means[1] / count;
+        wave.cc -= means[1] * means[1] / count;
+        wave
+    }
+
+    fn and(self, other: &Self) -> Self {
+        Wave {
+            ss: self.ss + other.ss,
+            sc: self.sc + other.sc,
+            cc: self.cc + other.cc,
+            sv: self.sv + other.sv,
+            cv: self.cv + other.cv,
+        }
+    }
+
+    /// Factors of sine and cosine.
+    fn factors(&self) -> [f64; 2] {
+        let det = self.ss * self.cc - self.sc * self.sc;
+        match det > 1e-6 * self.ss * self.cc {
+            true => [
+                (self.sv * self.cc - self.cv * self.sc) / det,
+                (self.cv * self.ss - self.sv * self.sc) / det,
+            ],
+            // less than a turn
+            false => [0.0; 2],
+        }
+    }
+
+    /// Phase at time 0, turns.
+    pub fn phase(&self) -> f64 {
+        let [sine, cosine] = self.factors();
+        libm::atan2(cosine, sine) / TAU
+    }
+
+    /// Squares that it holds.
+    pub fn power(&self) -> f64 {
+        let [sine, cosine] = self.factors();
+        sine * self.sv + cosine * self.cv
+    }
+}
+
+/// Lines of one frequency in several records.
+pub(crate) struct Waves {
+    /// Hz.
+    pub frequency: f64,
+    /// Of each record.
+    pub each: Vec<Wave>,
+    /// The most that lines of one phase hold, at any frequency.
+    pub together: f64,
+    /// All squares.
+    pub power: f64,
+}
+
+/// The frequency at which lines of any phase hold most of the samples (time, value) of several records.
+pub(crate) fn waves(records: &[Vec<(f64, f64)>], t_sw: f64) -> Option<Waves> {
+    let centred = records.iter().map(|samples| {
+        let mean = samples.iter().map(|(_, v)| v).sum::<f64>() / samples.len().max(1) as f64;
+        samples.iter().map(|(t, v)| (*t, v - mean)).collect::<Vec<_>>()
+    });
+    let records: Vec<Vec<(f64, f64)>> = centred.collect();
+    let span = |samples: &Vec<(f64, f64)>| match (samples.first(), samples.last()) {
+        (Some((from, _)), Some((to, _))) => to - from,
+        _ => 0.0,
+    };
+    let longest = records.iter().map(span).fold(0.0, f64::max);
+    let shortest = records.iter().map(span).fold(f64::INFINITY, f64::min);
+    if shortest <= 0.0 || !shortest.is_finite() {
+        return None;
+    }
+    let at = |frequency: f64| {
+        let each = records.iter().map(|samples| Wave::of(samples, frequency));
+        each.collect::<Vec<Wave>>()
+    };
+    let alone = |each: &[Wave]| each.iter().map(Wave::power).sum::<f64>();
+    let together = |each: &[Wave]| each.iter().fold(Wave::default(), Wave::and).power();
+    // a record has to hold a turn; a quarter of one between two frequencies
+    let (lowest, step) = ((LOWEST / t_sw).max(1.0 / shortest), 0.25 / longest);
+    let count = ((HIGHEST / t_sw - lowest) / step).max(0.0) as usize;
+    let grid = parallel::map(&(0..=count).collect::<Vec<_>>(), |k| {
+        let frequency = lowest + *k as f64 * step;
+        let each = at(frequency);
+        (alone(&each), together(&each), frequency)
+    });
+    let best = grid.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    // between its neighbours: the phase at a record's beginning goes with the frequency
+    let near = || (-NEARER..=NEARER).map(|k| best.2 + f64::from(k) * step / f64::from(NEARER));
+    let of_grid = grid.iter().map(|(_, together, _)| *together).fold(0.0, f64::max);
+    let frequency = near().max_by(|a, b| alone(&at(*a)).total_cmp(&alone(&at(*b))))?;
+    Some(Waves {
+        frequency,
+        each: at(frequency),
+        together: near().map(|frequency| together(&at(frequency))).fold(of_grid, f64::max),
+        power: records.iter().flatten().map(|(_, v)| v * v).sum(),
+    })
+}
+
+/// Places between two frequencies of a look: a sixteenth of a quarter of a turn over the record is a phase of 1.5 %.
+const NEARER: i32 = 16;
 
 /// Frequencies at which a filter may swing, as shares of the sampling frequency: below, a record holds few turns; above, two rows a turn
 /// are left.

@@ -1,4 +1,4 @@
-//! Counters of the duty beside a channel that something else disturbs: cases of the generator of blind cases, which shares no code with the plant.
+//! Causes beside a channel that something else disturbs: cases of the generator of blind cases, which shares no code with the plant.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -39,4 +39,16 @@ fn a_creeping_current_does_not_hide_a_counter() {
 #[test]
 fn a_counter_that_rounds_is_tried_where_one_that_cuts_off_does_not_hold() {
     is_named("counter_cut_or_rounded", "i_o", 7.517_986e-3);
+}
+
+/// A voltmeter that picks up a hum: of all causes a line of the source bends to it most, and leaves nothing in the voltage, which is what has to be set
+/// aside.
+#[test]
+fn a_channel_that_causes_bend_to_is_set_aside_where_they_leave_something_in_others() {
+    let findings = findings("pickup", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::MostlyExplained, "{}", findings.sentence);
+    assert_eq!(ids(&findings), ["turn_off_delay"], "{}", findings.sentence);
+    assert_eq!(findings.set_aside.as_ref().unwrap().channel, Some("v_o"));
+    let delay = &findings.causes[0].parameters["turn_off_delay"];
+    assert!(delay.low < 1.191_87e-7 && delay.high > 1.191_87e-7, "{delay:?}");
 }

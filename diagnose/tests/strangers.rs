@@ -66,14 +66,89 @@ fn causes_of_a_noisy_load_do_not_hold_in_a_record_that_the_model_explains() {
 }
 
 /// A counter of 30 steps, and a training record whose duties a counter of 10 rounds nearly as well: with that the held-out record is three times as far off
-/// as the model as given, in voltage and current.
+/// as the model as given, in voltage and current, which is no shift of sensors. Of all that round those duties alike it tells which it is.
 #[test]
-fn a_cause_that_makes_held_out_voltage_and_current_worse_is_no_shift_of_sensors() {
+fn a_counter_that_does_not_hold_in_the_held_out_record_gives_way_to_one_that_does() {
     let findings = findings("grown", &["judge.csv"]);
-    assert_eq!(findings.verdict, Verdict::Unexplained, "{}", findings.sentence);
+    assert_eq!(findings.verdict, Verdict::Explained, "{}", findings.sentence);
+    assert_eq!(ids(&findings), ["duty_quantisation"], "{}", findings.sentence);
+    let step = &findings.causes[0].parameters["duty_lsb"];
+    assert!(step.low < 1.0 / 30.0 && step.high > 1.0 / 30.0, "{step:?}");
+    assert!((30.0 * step.value - 1.0).abs() < 0.03, "{step:?}");
+}
+
+/// A counter of 67 steps and two duties: one of 27 that cuts off moves both by as much, and so do others.
+#[test]
+fn two_duties_leave_a_counter_open() {
+    let findings = findings("two_duties", &[]);
+    assert_eq!(ids(&findings), ["duty_quantisation"], "{}", findings.sentence);
+    let step = &findings.causes[0].parameters["duty_lsb"];
+    assert!(step.low < 1.0 / 67.0 && step.high > 1.0 / 67.0, "{step:?}");
+    let is_told = |note: &String| note.contains("round the few duties of these records alike");
     assert!(
-        findings.sentence.contains("further from the model"),
-        "{}",
-        findings.sentence
+        findings.noise.repairs.iter().any(is_told),
+        "{:?}",
+        findings.noise.repairs
     );
+}
+
+/// Nothing is wrong. A resistor of 30 ohm draws beside a current that steps, and i_out alone knows both: it was driven with the noise of its meter, and
+/// 1 % of a capacitance beside 45 ns of a sampling instant were named.
+#[test]
+fn a_current_beside_a_resistor_is_taken_without_the_noise_of_its_meter() {
+    let findings = findings("resistor_beside", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::Consistent, "{}", findings.sentence);
+    let is_told = |note: &String| note.contains("a load current beside a resistor of 29.");
+    assert!(
+        findings.noise.repairs.iter().any(is_told),
+        "{:?}",
+        findings.noise.repairs
+    );
+}
+
+/// A voltmeter that shows 2 % too much, and a resistor that is known as i_out over what that voltmeter shows: it is 2 % too large as well.
+#[test]
+fn a_resistor_read_off_two_meters_follows_the_gain_of_the_voltmeter() {
+    let findings = findings("voltmeter_and_resistor", &["judge.csv"]);
+    assert_eq!(ids(&findings), ["v_gain"], "{}", findings.sentence);
+    let gain = &findings.causes[0].parameters["gain"];
+    assert!(gain.low < 1.02 && gain.high > 1.02, "{gain:?}");
+}
+
+/// Nothing is wrong. The load steps for four and five rows at a time, anywhere in a period.
+#[test]
+fn both_ends_of_a_short_pulse_of_the_load_may_lie_inside_periods() {
+    let findings = findings("close_steps", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::Consistent, "{}", findings.sentence);
+    let is_told = |note: &String| note.contains("8 load steps are taken to lie inside");
+    assert!(
+        findings.noise.repairs.iter().any(is_told),
+        "{:?}",
+        findings.noise.repairs
+    );
+}
+
+/// A diode of 1.1 V where the model has .85, in a record whose duty steps and one whose load steps inside periods. Where the table has the load steps
+/// the capacitor leads, which does nothing beside free ones, and the diode was not tried there: it looked like a voltmeter of its own.
+#[test]
+fn a_cause_that_leads_only_beside_free_load_steps_is_found() {
+    let findings = findings("diode_beside_steps", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::Ambiguous, "{}", findings.sentence);
+    assert_eq!(ids(&findings), ["diode"], "{}", findings.sentence);
+    let v_f = &findings.causes[0].parameters["v_f"];
+    assert!(v_f.low < 1.1 && v_f.high > 1.1, "{v_f:?}");
+}
+
+/// A line of 4.066 V at 391.9 Hz on the source, of which each record begins at another phase: nobody triggers on it.
+#[test]
+fn each_record_begins_somewhere_in_a_line_of_the_source() {
+    let findings = findings("mains_phases", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::Explained, "{}", findings.sentence);
+    assert_eq!(ids(&findings), ["input_ripple"], "{}", findings.sentence);
+    let parameters = &findings.causes[0].parameters;
+    let (ripple, frequency) = (&parameters["ripple"], &parameters["frequency"]);
+    assert!(ripple.low < 4.0665 && ripple.high > 4.0665, "{ripple:?}");
+    assert!(frequency.low < 391.907 && frequency.high > 391.907, "{frequency:?}");
+    let held = findings.gain.heldout.iter().find(|held| held.channel == "v_o").unwrap();
+    assert!(held.rmse_after < 1.1 * held.floor, "{held:?}");
 }

@@ -105,10 +105,22 @@ impl<'a> Gains<'a> {
         counts.iter().map(of_one).collect()
     }
 
+    /// By how much chi-square rises if each level is moved by so much more, none of them beside others: nothing where there are too many levels.
+    pub fn rises(&self, by: &[f64]) -> Option<f64> {
+        let parts = self.parts.as_ref()?;
+        let square = parts.products.iter().zip(by).map(|(row, own)| own * dot(row, by));
+        Some(square.sum::<f64>() - 2.0 * dot(&parts.along, by))
+    }
+
     /// By how much a counter moves each level: what all duties are moved by alike the edges of the gate take over, and better than this
     /// circuit knows it.
     fn moves(&self, counts: f64) -> impl Iterator<Item = f64> {
-        let by = move |duty: f64| rounded(duty, counts, self.cut) - duty;
+        self.moves_of(counts, self.cut)
+    }
+
+    /// The same of a counter that rounds as `cut` says.
+    pub fn moves_of(&self, counts: f64, cut: Cut) -> impl Iterator<Item = f64> {
+        let by = move |duty: f64| rounded(duty, counts, cut) - duty;
         let each = self.levels.iter().zip(&self.shares);
         let mean = each.map(|(duty, share)| share * by(*duty)).sum::<f64>();
         self.levels.iter().map(move |duty| by(*duty) - mean)

@@ -93,6 +93,7 @@ impl Raw<'_> {
             settled: true,
             repeated: false,
             scatter: lines.scatter,
+            clock: 0.0,
             metered: None,
             levels: Vec::new(),
             free_levels: Vec::new(),

@@ -17,6 +17,8 @@ use crate::flicker;
 use crate::noise;
 use crate::slopes::load_steps;
 
+use super::beside_resistor;
+
 /// Logarithms of the number of rows that a cut must gain in chi-square. The largest of n squares of white noise is about 2 ln n,
 /// and passes 4 ln n once in n records.
 const PER_CUT: f64 = 4.0;
@@ -36,7 +38,7 @@ const SURE_STEP: f64 = 4.0;
 
 /// What a meter may have shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Form {
+pub(super) enum Form {
     Current,
     Resistor,
     Power,
@@ -149,22 +151,26 @@ pub fn find(i_out: &[f64], v_out: &[f64], digit: f64, phase: f64) -> Option<Leve
     if noise.is_nan() || noise <= 0.0 {
         return None;
     }
-    let mut best: Option<(f64, Form, Rows, Vec<usize>)> = None;
-    for form in FORMS {
-        let Some(rows) = Rows::new(form, &known, i_out, v_out, noise) else {
-            continue;
-        };
-        let Some(cuts) = rows.cuts() else { continue };
+    let plain = FORMS.into_iter().filter_map(|form| {
+        let rows = Rows::new(form, &known, i_out, v_out, noise)?;
+        let cuts = rows.cuts()?;
+        Some((form, 0.0, rows, cuts))
+    });
+    let mixed = beside_resistor::find(&known, i_out, v_out, noise);
+    let mixed = mixed.map(|(conductance, rows, cuts)| (Form::Current, conductance, rows, cuts));
+    let mut best: Option<(f64, Form, f64, Rows, Vec<usize>)> = None;
+    for (form, conductance, rows, cuts) in plain.chain(mixed) {
         if !rows.is_white(&cuts) {
             continue;
         }
-        let price = libm::log(known.len() as f64) * (form.parameters() * (cuts.len() + 1) as f64 + cuts.len() as f64);
-        let score = rows.cost_of(&cuts) + price;
+        let more = if conductance > 0.0 { 1.0 } else { 0.0 };
+        let numbers = form.parameters() * (cuts.len() + 1) as f64 + cuts.len() as f64 + more;
+        let score = rows.cost_of(&cuts) + libm::log(known.len() as f64) * numbers;
         if best.as_ref().is_none_or(|(least, ..)| score < least - CLEARLY) {
-            best = Some((score, form, rows, cuts));
+            best = Some((score, form, conductance, rows, cuts));
         }
     }
-    let (_, form, rows, cuts) = best?;
+    let (_, form, conductance, rows, cuts) = best?;
     let mut load = Vec::with_capacity(i_out.len());
     let mut levels = Vec::new();
     for (from, to) in rows.stretches(&cuts) {
@@ -173,12 +179,16 @@ pub fn find(i_out: &[f64], v_out: &[f64], digit: f64, phase: f64) -> Option<Leve
         levels.extend(rows.level(form, (from, to), load.len()..end));
         while load.len() < end {
             // a row's load is that of its period, whose middle a sample need not be
-            load.push(form.load(rows.place(load.len() as f64 + 0.5 - phase), fit));
+            let own = form.load(rows.place(load.len() as f64 + 0.5 - phase), fit);
+            load.push(Load {
+                conductance: own.conductance + conductance,
+                ..own
+            });
         }
     }
     let is_load = load.iter().all(|load| load.conductance >= 0.0 && load.power >= 0.0);
     is_load.then(|| Levels {
-        words: rows.words(form, &cuts, &in_slopes(form, &load, &known)),
+        words: rows.words((form, conductance), &cuts, &in_slopes(form, &load, &known)),
         load,
         levels,
         noise,
@@ -193,7 +203,7 @@ fn in_slopes(form: Form, load: &[Load], known: &[usize]) -> Vec<usize> {
 }
 
 /// Sums over the rows before each, of all products that least squares needs.
-struct Rows {
+pub(super) struct Rows {
     regressors: Vec<[f64; 2]>,
     values: Vec<f64>,
     /// aa, ab, bb, ai, bi, ii.
@@ -204,7 +214,7 @@ struct Rows {
 
 impl Rows {
     /// Nothing if a voltage is missing that the form needs.
-    fn new(form: Form, known: &[usize], i_out: &[f64], v_out: &[f64], noise: f64) -> Option<Self> {
+    pub(super) fn new(form: Form, known: &[usize], i_out: &[f64], v_out: &[f64], noise: f64) -> Option<Self> {
         let count = i_out.len().max(1) as f64;
         let of = |n: &usize| {
             let v = v_out.get(*n).copied().unwrap_or(f64::NAN);
@@ -276,7 +286,7 @@ impl Rows {
         square.max(0.0) / (self.noise * self.noise)
     }
 
-    fn stretches(&self, cuts: &[usize]) -> Vec<(usize, usize)> {
+    pub(super) fn stretches(&self, cuts: &[usize]) -> Vec<(usize, usize)> {
         let ends = cuts.iter().copied().chain([self.values.len()]);
         std::iter::once(0).chain(cuts.iter().copied()).zip(ends).collect()
     }
@@ -296,7 +306,7 @@ impl Rows {
     }
 
     /// Where the level changes; nothing if that is nearly everywhere.
-    fn cuts(&self) -> Option<Vec<usize>> {
+    pub(super) fn cuts(&self) -> Option<Vec<usize>> {
         let n = self.values.len().max(2) as f64;
         let least = PER_CUT * libm::log(n) * (1.0 + NOISE_UNSURE / n.sqrt()).powi(2);
         let most = self.values.len() / ROWS_PER_LEVEL;
@@ -346,7 +356,7 @@ impl Rows {
     }
 
     /// What to say; `in_slopes` are places of rows that lie between two levels.
-    fn words(&self, form: Form, cuts: &[usize], in_slopes: &[usize]) -> String {
+    fn words(&self, (form, conductance): (Form, f64), cuts: &[usize], in_slopes: &[usize]) -> String {
         let mut stretches = self.stretches(cuts);
         stretches.retain(|(from, _)| !in_slopes.contains(from));
         let count = stretches.len();
@@ -357,6 +367,10 @@ impl Rows {
             (_, count) => format!("{count} stretches at rest"),
         };
         let level = |(from, to): &(usize, usize)| self.values[*from..*to].iter().sum::<f64>() / (to - from) as f64;
+        let beside = match conductance > 0.0 {
+            true => format!(" beside a resistor of {}", crate::words::si(conductance.recip(), "ohm")),
+            false => String::new(),
+        };
         let small = stretches
             .windows(2)
             .filter(|pair| (level(&pair[0]) - level(&pair[1])).abs() < SURE_STEP * self.noise)
@@ -371,7 +385,7 @@ impl Rows {
             rows => format!(", with {rows} rows in the slopes between them,"),
         };
         format!(
-            "i_out is taken for a {} in {what}{between} without the noise of its meter ({}){unsure}",
+            "i_out is taken for a {}{beside} in {what}{between} without the noise of its meter ({}){unsure}",
             form.words(),
             crate::words::si(self.noise, "A")
         )

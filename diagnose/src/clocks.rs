@@ -1,0 +1,125 @@
+//! When each record began on the clock of the mains.
+//!
+//! ```text
+//! first record     ╱╲╱╲╱╲╱        phase of the line at its time 0
+//! second record    ╲╱╲╱╲╱╲        another one: nobody triggers on the mains
+//! ```
+//! A line on the source goes on between two records, and each begins somewhere in it. So the phase is that of the first record, and every other record
+//! has a clock that says when it began. In the training records these are read off what the model as given leaves; in a held-out record, which a
+//! line that was found foretells but for its beginning, they are what fits.
+
+use std::f64::consts::TAU;
+
+use crate::drive::Model;
+use crate::fit::State;
+use crate::noise::channel;
+use crate::problem::{Problem, Starts};
+use crate::record::Record;
+use crate::spectrum::{Wave, waves};
+use crate::words::si;
+
+/// Share of a channel's squares that lines of one frequency hold before anything is read off them: as of a line that is told, [`crate::shape`].
+const LINE: f64 = 0.15;
+/// A clock of its own has to be worth this in chi-square: five standard deviations, since the one of many that fits best is taken.
+const WORTH: f64 = 25.0;
+/// Lines of one phase hold this share of what lines of their own phases hold in an output: what else is left of a channel bends them apart by some hundredths of a turn, of
+/// which the last is a thirtieth of a turn. A convention.
+const OF_THE_OUTPUT: f64 = 0.95;
+/// Channels that show a line of the source best, and the share of it that lines of one phase hold: its own voltage shows little else.
+const SHOWN_BY: [(usize, f64); 2] = [(3, 1.0), (0, OF_THE_OUTPUT)];
+
+fn is_over_time(record: &Record) -> bool {
+    !record.settled && record.capture.is_none()
+}
+
+/// Sets the clocks of records of which `state` leaves lines of one frequency in phases of their own; whether any was set.
+pub fn align(problem: &mut Problem, state: &State) -> bool {
+    let indices: Vec<usize> = (0..problem.records.len())
+        .filter(|n| is_over_time(&problem.records[*n]))
+        .collect();
+    // a channel that shows one line in one phase has the last word
+    let found = SHOWN_BY.iter().find_map(|by| common(problem, state, &indices, *by));
+    let Some((frequency, each)) = found.filter(|(_, each)| !each.is_empty()) else {
+        return false;
+    };
+    let [first, others @ ..] = &each[..] else { return false };
+    let name = problem.records[first.0].name.clone();
+    for (index, wave) in others {
+        let turns = wave.phase() - first.1.phase();
+        let turns = turns - turns.round();
+        let record = &mut problem.records[*index];
+        record.clock = turns / frequency;
+        record.repairs.push(format!(
+            "its line at {} began {turns:+.2} turns beside that of {name}: each record begins somewhere in it",
+            si(frequency, "Hz")
+        ));
+    }
+    true
+}
+
+/// The frequency of the lines that a channel of all these records holds, and the line of each, none of them where they are of one phase; nothing where there
+/// is no line.
+fn common(
+    problem: &Problem,
+    state: &State,
+    indices: &[usize],
+    (n, of_one_phase): (usize, f64),
+) -> Option<(f64, Vec<(usize, Wave)>)> {
+    let of = |index: &usize| {
+        let values = channel(problem, &state.residual, *index, n);
+        let times = &problem.records[*index].time;
+        let pairs = values.iter().zip(times).filter(|(value, _)| **value != 0.0);
+        pairs.map(|(value, time)| (*time, *value)).collect::<Vec<_>>()
+    };
+    let samples: Vec<Vec<(f64, f64)>> = indices.iter().map(of).collect();
+    let found = waves(&samples, problem.bases.t_sw)?;
+    let alone: f64 = found.each.iter().map(Wave::power).sum();
+    let together = found.together;
+    let is_line = alone > LINE * found.power && found.each.iter().all(|wave| wave.power() > WORTH);
+    if found.each.len() < 2 || !is_line {
+        return None;
+    }
+    let gain = WORTH * (found.each.len() - 1) as f64;
+    let are_apart = alone > together + gain && together < of_one_phase * alone;
+    let each = if are_apart { found.each } else { Vec::new() };
+    Some((found.frequency, indices.iter().copied().zip(each).collect()))
+}
+
+/// Sets the clocks of records from the `first` on for a model with a line on its source: chi-square goes with the phase as a sine, which three places tell.
+/// Whether one was set.
+pub fn tune(problem: &mut Problem, model: &Model, trim: f64, first: usize) -> bool {
+    let frequency = model.plant.source.ripple_frequency;
+    if model.plant.source.ripple <= 0.0 || frequency <= 0.0 {
+        return false;
+    }
+    let mut is_set = false;
+    for index in first..problem.records.len() {
+        if !is_over_time(&problem.records[index]) {
+            continue;
+        }
+        let chi2 = |turns: f64| {
+            let mut alone = problem.clone();
+            alone.records = vec![Record {
+                clock: turns / frequency,
+                ..problem.records[index].clone()
+            }];
+            (alone.offsets, alone.masked) = (vec![0], vec![problem.masked[index].clone()]);
+            let starts = Starts {
+                trim,
+                ..alone.first_starts(model)
+            };
+            State::settle(&alone, model, &starts, None).chi2
+        };
+        let third = [0.0, 1.0 / 3.0, 2.0 / 3.0].map(|turns| (turns, chi2(turns)));
+        let sum = |of: fn(f64) -> f64| third.iter().map(|(turns, chi2)| chi2 * of(TAU * turns)).sum::<f64>();
+        // the lowest place of a + b cos + c sin lies half a turn from its highest
+        let turns = libm::atan2(sum(libm::sin), sum(libm::cos)) / TAU + 0.5;
+        let turns = turns - turns.round();
+        let own = chi2(problem.records[index].clock * frequency);
+        if chi2(turns) < own - WORTH {
+            problem.records[index].clock = turns / frequency;
+            is_set = true;
+        }
+    }
+    is_set
+}

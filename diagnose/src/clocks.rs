@@ -43,18 +43,25 @@ pub fn align(problem: &mut Problem, state: &State) -> bool {
         return false;
     };
     let [first, others @ ..] = &each[..] else { return false };
-    let name = problem.records[first.0].name.clone();
     for (index, wave) in others {
         let turns = wave.phase() - first.1.phase();
-        let turns = turns - turns.round();
-        let record = &mut problem.records[*index];
-        record.clock = turns / frequency;
-        record.repairs.push(format!(
-            "its line at {} began {turns:+.2} turns beside that of {name}: each record begins somewhere in it",
-            si(frequency, "Hz")
-        ));
+        problem.records[*index].clock = (turns - turns.round()) / frequency;
     }
     true
+}
+
+/// What to say of the clocks of records beside a model with a line on its source.
+pub fn notes<'a>(records: impl Iterator<Item = &'a Record> + 'a, model: &Model) -> impl Iterator<Item = String> + 'a {
+    let (ripple, frequency) = (model.plant.source.ripple, model.plant.source.ripple_frequency);
+    let said = records.filter(move |record| ripple > 0.0 && record.clock != 0.0);
+    said.map(move |record| {
+        format!(
+            "{}: its line at {} begins {:+.2} turns beside that of the first record: each begins somewhere in it",
+            record.name,
+            si(frequency, "Hz"),
+            record.clock * frequency
+        )
+    })
 }
 
 /// The frequency of the lines that a channel of all these records holds, and the line of each, none of them where they are of one phase; nothing where there

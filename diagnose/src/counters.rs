@@ -25,6 +25,8 @@ use crate::search::TIE;
 const TRIED: usize = 12;
 /// Counters that are judged by held-out records where the one that was found does not hold. A convention for time.
 const MOST_JUDGED: usize = 96;
+/// Digits of a step in words.
+const DIGITS: usize = 4;
 /// Both ends of an interval this far apart, as a ratio, hold counters of several numbers of counts: the interval of one counter is a hundredth of a count.
 const SEVERAL: f64 = 1.1;
 
@@ -81,8 +83,15 @@ impl Examined {
         });
         let holding = judged.into_iter().flatten();
         let (fit, pair) = holding.min_by(|a, b| a.1.total().1.total_cmp(&b.1.total().1))?;
+        let number = counter.number;
+        let [before, step] = [counter.best, &fit].map(|fit| report::quantity(fit.values[number], "", DIGITS));
+        let words = format!(
+            "of the counters that round the few duties of the training records alike the held-out ones tell this one, a step of {step} in the place of {before}: \
+             another record has to judge it"
+        );
         self.attribution.best = Some(fit);
         self.answer();
+        self.odd.push(words);
         Some(pair)
     }
 }

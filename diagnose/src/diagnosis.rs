@@ -8,6 +8,7 @@ use crate::attribute::Attribution;
 use crate::beside;
 use crate::capture::estimates::{self, Driven, Estimates};
 use crate::capture::terms::delays;
+use crate::clocks;
 use crate::compared;
 use crate::control::Request;
 use crate::counters;
@@ -430,7 +431,9 @@ fn notes(found: &Examined, pair: Option<&Pair>) -> Vec<String> {
     let (problem, attribution) = (&found.problem, &found.attribution);
     let held = pair.map_or(&[][..], |pair| &pair.problem.records);
     let records = problem.records.iter().chain(held);
+    let clocks = clocks::notes(records.clone(), &attribution.state().model);
     let mut notes = by_text(records);
+    notes.extend(clocks.filter(|_| found.verdict != Verdict::Unexplained));
     notes.extend(left_out::notes(problem, &found.outliers));
     notes.extend(
         pair.into_iter()

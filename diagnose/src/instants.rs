@@ -55,16 +55,19 @@ fn steps(record: &Record) -> Vec<LoadStep> {
         let mut segments = record.segments.iter();
         segments.any(|s| s.start + FREE_APART <= step.first && step.last + TELLING <= s.end)
     };
-    let free: Vec<LoadStep> = (all.iter().copied())
+    let mut free: Vec<LoadStep> = (all.iter().copied())
         .filter(|step| alone(step, CLOSEST) && inside(step))
+        .take(MOST)
         .collect();
-    // what is not free has to be farther off
-    let is_fixed = |step: &LoadStep| !free.contains(step);
-    let is_clear = |step: &LoadStep| {
-        let mut fixed = all.iter().filter(|other| is_fixed(other));
-        fixed.all(|other| apart(step, other) >= 2 * FREE_APART)
-    };
-    free.iter().copied().filter(is_clear).take(MOST).collect()
+    // what is not free has to be farther off, and each that is not for that has to be so, too
+    loop {
+        let fixed: Vec<LoadStep> = all.iter().copied().filter(|step| !free.contains(step)).collect();
+        let count = free.len();
+        free.retain(|step| fixed.iter().all(|other| apart(step, other) >= 2 * FREE_APART));
+        if free.len() == count {
+            return free;
+        }
+    }
 }
 
 /// The problem with free instants in the records that are much better with them, and where the model of `at` then stands; nothing

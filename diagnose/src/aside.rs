@@ -262,7 +262,7 @@ fn left_by_one_cause(whole: &Examined, n: usize) -> f64 {
     };
     let WithoutChannel {
         problem, null, fits, ..
-    } = WithoutChannel::of(&fitter, &attribution.singles, attribution.best.as_ref(), n);
+    } = WithoutChannel::of(&fitter, &attribution.singles, attribution.best.as_ref(), (n, false));
     let left = |problem: &Problem, state: &State| above(problem, state, |_, _| true);
     let states = fits.iter().map(|fit| &fit.state).chain([&null]);
     let best = states.min_by(|a, b| left(&problem, a).total_cmp(&left(&problem, b)));

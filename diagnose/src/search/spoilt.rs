@@ -31,8 +31,8 @@ pub(crate) struct WithoutChannel {
 }
 
 impl WithoutChannel {
-    /// Fits the leaders among `singles` without channel `n`, and each cause of the set that is `best`.
-    pub fn of(fitter: &Fitter<'_>, singles: &[Fit], best: Option<&Fit>, n: usize) -> Self {
+    /// Fits the leaders among `singles` without channel `n`, and each cause of the set that is `best`; `to_the_end`, or the first steps, which rank.
+    pub fn of(fitter: &Fitter<'_>, singles: &[Fit], best: Option<&Fit>, (n, to_the_end): (usize, bool)) -> Self {
         let mut problem = fitter.problem.clone();
         for masked in &mut problem.masked {
             masked[n].fill(true);
@@ -54,7 +54,10 @@ impl WithoutChannel {
                 begun.push((cause, values));
             }
         }
-        let mut fits = parallel::map(&begun, |(cause, values)| own.from(&[*cause], values, &null));
+        let mut fits = parallel::map(&begun, |(cause, values)| match to_the_end {
+            true => own.from(&[*cause], values, &null),
+            false => own.first_steps(&[*cause], values, &null),
+        });
         fits.extend(counters(&own));
         WithoutChannel {
             channel: n,
@@ -149,7 +152,7 @@ impl Searcher<'_> {
         let is_left = |n: &usize| left.iter().any(|one| one.channel == CHANNEL_NAMES[*n]);
         let channels = (0..CHANNELS).filter(|n| is_left(n) && may_miss(problem, *n));
         let found = channels.flat_map(|n| {
-            let without = WithoutChannel::of(&self.fitter, singles, None, n);
+            let without = WithoutChannel::of(&self.fitter, singles, None, (n, true));
             let least = without.explain().min_by(|a, b| self.score(a).total_cmp(&self.score(b)));
             least.map(|fit| Fit {
                 state: State::at(problem, &fit.state.model, fit.state.starts.clone()),

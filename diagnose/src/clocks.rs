@@ -22,8 +22,8 @@ use crate::words::si;
 const LINE: f64 = 0.15;
 /// A clock of its own has to be worth this in chi-square: five standard deviations, since the one of many that fits best is taken.
 const WORTH: f64 = 25.0;
-/// Lines of one phase hold this share of what lines of their own phases hold in an output: what else is left of a channel bends them apart by some hundredths of a turn, of
-/// which the last is a thirtieth of a turn. A convention.
+/// Lines of one phase hold this share of what lines of their own phases hold in an output: two equal ones that are d turns apart hold
+/// cos^2(pi d) together, and .95 is .07 turns. What else is left of the output bent two of one phase apart by .015 in a blind case. A convention above that.
 const OF_THE_OUTPUT: f64 = 0.95;
 /// Channels that show a line of the source best, and the share of it that lines of one phase hold: its own voltage shows little else.
 const SHOWN_BY: [(usize, f64); 2] = [(3, 1.0), (0, OF_THE_OUTPUT)];

@@ -62,15 +62,8 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
         };
         // the median: one noisy record must not hide what the others show
         let typical = middle((0..problem.records.len()).map(of)) * few::unsure(problem, n);
-        let steps = problem.records.iter().map(|r| r.lattice[n].max(r.resolution[n]));
-        let lattice = steps.fold(0.0, f64::max);
-        let scale = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n];
-        // step / sqrt 12: the standard deviation of rounding
-        let least = (lattice / 12f64.sqrt())
-            .max(least_share(problem) * scale)
-            .max(stuck(problem, n))
-            .max(few::steps(problem, n))
-            .max(few::rounded(problem, n));
+        let scale = scale(problem, n);
+        let least = least(problem, n);
         let has = problem
             .records
             .iter()
@@ -84,6 +77,23 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             (true, false) => few::of_fewest(problem, residual, n, scale).max(least),
         }
     })
+}
+
+fn scale(problem: &Problem, n: usize) -> f64 {
+    [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n]
+}
+
+/// The least noise of a channel, V or A: what its digits, its meter and the simulators are, whatever its values happen to scatter by.
+#[must_use]
+pub(crate) fn least(problem: &Problem, n: usize) -> f64 {
+    let steps = problem.records.iter().map(|r| r.lattice[n].max(r.resolution[n]));
+    let lattice = steps.fold(0.0, f64::max);
+    // step / sqrt 12: the standard deviation of rounding
+    (lattice / 12f64.sqrt())
+        .max(least_share(problem) * scale(problem, n))
+        .max(stuck(problem, n))
+        .max(few::steps(problem, n))
+        .max(few::rounded(problem, n))
 }
 
 /// The least noise, as a share of the signal. A row a period is sampled with 13 bits at best (1e-4), and two simulators of

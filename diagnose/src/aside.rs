@@ -25,7 +25,7 @@ use crate::level::threshold;
 use crate::noise;
 use crate::problem::{Problem, dot};
 use crate::progress::{Listener, Progress};
-use crate::record::{CHANNEL_NAMES, CHANNELS, LOAD_CURRENT, Record};
+use crate::record::{CHANNEL_NAMES, CHANNELS, LOAD_CURRENT, Record, V_IN};
 use crate::search::WithoutChannel;
 use crate::shape::{self, Structure, structures};
 use crate::worth;
@@ -290,12 +290,16 @@ fn helps(pair: &Pair, found: &Examined) -> bool {
 }
 
 /// Whether one channel is enough to tell of the causes, where no other is left beside the one that was set aside: only with a held-out record, and of
-/// records that are read as they were made (a duty that waits is a shift of rows as well). Not of an instrument, which would be the one that is left. Nor of
-/// an inductor's curve where its current is set aside: where that is another than the law's it bends to the voltage, and the current shows it. In the
-/// held-out record the other channel may be off by more, since what disturbs it may run against the causes, but a cause that takes it much further off is
-/// one of a bent fit.
+/// records that are read as they were made (a duty that waits is a shift of rows as well). Not of an instrument, which would be the one that is left. In
+/// the held-out record the other channel may be off by more, since what disturbs it may run against the causes, but a cause that takes it much further off is
+/// one of a bent fit, unless the channel that is left has nothing of what is left in the other. That has to be so of an inductor's curve where its current is
+/// set aside: where it is another than the law's it bends to the voltage, and the current shows it.
 fn tells_alone(part: Part, found: &Examined, whole: &Examined, heldout: &[Record], base: &Model) -> bool {
     let Part::Channel(n) = part else { return true };
+    // the source's voltage is no reading of what the other channels show: they are as many as where it was never measured
+    if n == V_IN {
+        return true;
+    }
     let others = (0..CHANNELS).filter(|other| *other != n && whole.problem.sigma[*other].is_finite());
     if others.count() > 1 {
         return true;
@@ -309,8 +313,7 @@ fn tells_alone(part: Part, found: &Examined, whole: &Examined, heldout: &[Record
     let is_misread = (whole.doubts.iter()).any(|doubt| matches!(doubt, Doubt::Bench(words) if !is_its_own(words)));
     let is_odd = |cause: &&Cause| {
         let is_late = cause.id == "duty_delay";
-        let is_of_current = cause.id == "l_saturation" && n == INDUCTOR_CURRENT;
-        is_misread && !is_late || is_of_current || cause.kind == Kind::Instrument
+        is_misread && !is_late || cause.kind == Kind::Instrument
     };
     if causes.iter().any(is_odd) {
         return false;
@@ -324,7 +327,13 @@ fn tells_alone(part: Part, found: &Examined, whole: &Examined, heldout: &[Record
             let values = records.flat_map(|record| noise::channel(&pair.problem, &state.residual, record, n));
             values.map(|left| left * left).sum()
         };
-        of(&pair.after) <= MUCH_WORSE * of(&pair.before)
+        // what the other channel would have to show, and has not: an instrument does that, however much the cause had hidden of it
+        let is_missing = || {
+            let mut records = 0..pair.problem.records.len();
+            records.all(|record| shape::is_missing_elsewhere(&pair.problem, &pair.after, (record, n)))
+        };
+        let is_of_current = causes.iter().any(|cause| cause.id == "l_saturation") && n == INDUCTOR_CURRENT;
+        !is_of_current && of(&pair.after) <= MUCH_WORSE * of(&pair.before) || is_missing()
     })
 }
 

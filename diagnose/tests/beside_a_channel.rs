@@ -52,3 +52,44 @@ fn a_channel_that_causes_bend_to_is_set_aside_where_they_leave_something_in_othe
     let delay = &findings.causes[0].parameters["turn_off_delay"];
     assert!(delay.low < 1.191_87e-7 && delay.high > 1.191_87e-7, "{delay:?}");
 }
+
+/// One cause is named in `folder` with the value that was hidden, and `channel` is set aside.
+fn holds(folder: &str, channel: &str, id: &str, (name, hidden): (&str, f64)) {
+    let findings = findings(folder, &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::MostlyExplained, "{}", findings.sentence);
+    assert_eq!(ids(&findings), [id], "{}", findings.sentence);
+    assert_eq!(findings.set_aside.as_ref().unwrap().channel, Some(channel));
+    let found = &findings.causes[0].parameters[name];
+    assert!(found.low < hidden && found.high > hidden, "{found:?}");
+}
+
+/// A voltmeter that is off by the cube of what it shows runs against a winding of more resistance, and hides it: with the winding the voltage of the held-out
+/// record is 1.8 times as far off as without. The current has nothing of that.
+#[test]
+fn a_cause_that_the_disturbance_had_hidden_is_named() {
+    holds("winding_beside_voltmeter", "v_o", "dcr", ("dcr", 9.537_592e-2));
+}
+
+/// An inductor current that creeps; the voltage shows the curve of the core by itself, and nothing of the creeping.
+#[test]
+fn the_curve_of_a_core_is_named_beside_a_current_that_creeps() {
+    holds("core_beside_creep", "i_l", "l_saturation", ("i_sat", 12.117_19));
+}
+
+/// What a meter of the source picks up has another phase in each record, and is a line for that: no converter kicks it.
+#[test]
+fn what_the_meter_of_the_source_picks_up_is_set_aside() {
+    holds("pickup_of_source", "v_in", "c_wrong", ("capacitance", 1.873_82e-6));
+}
+
+/// A measured voltage of the source, with structure by chance, and nothing but the output voltage beside it. That shows as much as if the source had
+/// never been measured.
+#[test]
+fn beside_the_source_one_channel_is_enough() {
+    holds(
+        "low_pass_beside_source",
+        "v_in",
+        "sensor_low_pass",
+        ("time_constant", 1.172e-5),
+    );
+}

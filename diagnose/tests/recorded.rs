@@ -146,6 +146,20 @@ fn a_core_of_another_law_is_found_beside_steps_inside_periods() {
     }
 }
 
+/// A converter that steps 12 V down to 1.9 V behind leads and an input capacitor of about a tenth of an ohm: little beside what the source sees, and four fifths of
+/// the load.
+#[test]
+fn an_input_filter_of_a_converter_that_steps_far_down_is_found() {
+    let findings = findings("input_filter_far_down", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::Explained, "{}", findings.sentence);
+    assert_eq!(ids(&findings), ["source_impedance"], "{}", findings.sentence);
+    let hidden = [("resistance", 0.189_142), ("inductance", 2.494_232e-6)];
+    for (name, hidden) in hidden {
+        let found = &findings.causes[0].parameters[name];
+        assert!(found.low < hidden && found.high > hidden, "{name}: {found:?}");
+    }
+}
+
 /// A real converter of 24 V that remembers, of a data set of SysIdentPy (LICENSE in its folder), held against a model whose numbers are guesses. Causes leave
 /// nothing of it but a doubt, so that none is believed; a tuned black box reaches 0.44 V where nothing is fed back.
 #[test]

@@ -38,7 +38,7 @@ pub(super) const SOURCE_IMPEDANCE: Cause = Cause {
                     Reach::SourceResistance(0.01, 0.5, 0.005),
                 ),
                 knob("c_in", &["source.c_in"], Reach::Capacitance(1.0, 1e4, 2.0)),
-                knob("esr_in", &["source.esr_in"], OHMS),
+                knob("esr_in", &["source.esr_in"], SOURCE_OHMS),
             ],
             Search::From(&[&[4.0, 3.0, 1.0], &[4.0, 20.0, 1.0]]),
         )
@@ -54,7 +54,7 @@ pub(super) const SOURCE_IMPEDANCE: Cause = Cause {
                     Reach::Inductance(2e-3, 100.0, 0.02),
                 ),
                 knob("c_in", &["source.c_in"], Reach::Capacitance(0.05, 1e4, 0.5)),
-                knob("esr_in", &["source.esr_in"], OHMS),
+                knob("esr_in", &["source.esr_in"], SOURCE_OHMS),
             ],
             Search::Swing,
         ),

@@ -7,7 +7,7 @@ use crate::ideal::Ideal;
 use crate::noise::channel;
 use crate::problem::{Problem, dot};
 use crate::record::{LOAD_CURRENT, Record};
-use crate::spectrum::strongest_line;
+use crate::spectrum::strongest_line_of;
 use plant::Load;
 
 /// A swing is missing in the other state where that holds less than one over this of the square that it should. Its frequency and damping are
@@ -59,7 +59,7 @@ pub(crate) fn is_kicked(problem: &Problem, state: &State, (index, n): (usize, us
         && kicks(record, &values, excess).is_none()
         && !dies_away(record, &values)
         && trembling(problem, &values, excess).is_some()
-        && strongest_line(problem, &state.residual, n).is_none_or(|line| of_line(line.share) < OF_EXCESS)
+        && strongest_line_of(problem, &state.residual, (index, n)).is_none_or(|line| of_line(line.share) < OF_EXCESS)
 }
 
 /// Whether a channel's swing is missing in the other state, where it would be seen: inductor and capacitor hand on the same energy, so that

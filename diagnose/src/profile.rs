@@ -31,8 +31,8 @@ const ENDS: usize = 3;
 const PLACES: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
 /// The place that is tried first.
 const FIRST: f64 = 1.0;
-/// Standard deviation of what two simulators of one circuit make of one parameter, as a share of its change. Of 28 parameters found in ngspice's data
-/// where noise says less than that 25 lie within 1.96 of it, in a simulator of exact pieces 67 of 69.
+/// Standard deviation of what two simulators of one circuit make of one parameter, as a share of its change. Of the parameters of which [`crate::level::ACCURACY`]
+/// had made most of the interval, 20 of 23 in ngspice's data lie within 1.96 of it, and 88 of 95 in those of a simulator of exact pieces; noise adds to that.
 const SIMULATORS: f64 = 0.002;
 
 /// The profile of one parameter.

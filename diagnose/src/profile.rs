@@ -77,11 +77,11 @@ impl Profile {
 }
 
 /// Profiles of all parameters of the best explanation. The intervals allow for the accuracy of the plant too. Where another value fits better than
-/// that of the explanation, its fit had not come to its end: it goes on from there. Behind the end of the budget they are [`parabolas`].
+/// that of the explanation, its fit had not come to its end: it goes on from there. Behind the end of the budget they are [`parabolas`], where there is one.
 #[must_use]
 pub fn profiles(problem: &Problem, attribution: &mut Attribution, say: Listener<'_>) -> Vec<Profile> {
     if attribution.best.is_none() || !problem.work.may_seek_intervals() {
-        return parabolas(problem, attribution);
+        return behind_the_budget(problem, attribution);
     }
     let mut found = of_best(problem, attribution, say);
     for _ in 0..ENDS {
@@ -93,7 +93,7 @@ pub fn profiles(problem: &Problem, attribution: &mut Attribution, say: Listener<
             .from(&best.causes, &lower.values, &lower.state);
         attribution.best = Some(if fit.state.chi2 < lower.state.chi2 { fit } else { lower });
         if !problem.work.may_seek_intervals() {
-            return parabolas(problem, attribution);
+            return behind_the_budget(problem, attribution);
         }
         found = of_best(problem, attribution, say);
     }
@@ -108,14 +108,7 @@ fn of_best(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> (
     let fitter = attribution.fitter(problem);
     let numbers: Vec<usize> = (0..fitter.places(&best.causes).len()).collect();
     let each = progress::map(say, "intervals", &numbers, |number| {
-        let along = Along {
-            fitter: &fitter,
-            best,
-            number: *number,
-            inflation: attribution.inflation,
-            scatter: Cell::new(1.0),
-            lower: RefCell::new(None),
-        };
+        let along = Along::new(&fitter, best, *number, attribution.inflation);
         let profile = along.profile(attribution);
         (profile, along.lower.into_inner())
     });
@@ -139,7 +132,18 @@ struct Along<'a> {
     lower: RefCell<Option<Fit>>,
 }
 
-impl Along<'_> {
+impl<'a> Along<'a> {
+    fn new(fitter: &'a Fitter<'a>, best: &'a Fit, number: usize, inflation: f64) -> Self {
+        Along {
+            fitter,
+            best,
+            number,
+            inflation,
+            scatter: Cell::new(1.0),
+            lower: RefCell::new(None),
+        }
+    }
+
     fn at(&self, x: f64) -> Fit {
         let mut values = self.best.values.clone();
         values[self.number] = x;
@@ -249,6 +253,20 @@ fn scale(candidate: &Candidate, sigma: f64, step: f64) -> f64 {
     }
 }
 
+/// [`parabolas`], and the curve itself of a parameter that has none: a counter, or one that the fit held at an end. A few fits.
+fn behind_the_budget(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
+    let mut all = parabolas(problem, attribution);
+    let Some(best) = &attribution.best else { return all };
+    let fitter = attribution.fitter(problem);
+    for (number, profile) in all.iter_mut().enumerate() {
+        // no variance is no certainty: without this its interval would be a point
+        if best.covariance[number][number] <= 0.0 {
+            *profile = Along::new(&fitter, best, number, attribution.inflation).profile(attribution);
+        }
+    }
+    all
+}
+
 /// What covariances say of the parameters: intervals without a fit.
 #[must_use]
 pub fn parabolas(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
@@ -260,17 +278,16 @@ pub fn parabolas(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
         let candidate = &attribution.candidates[place.0];
         let knob = &candidate.form.knobs[place.1];
         let (value, [low, high, _]) = (best.values[number], fitter.range(*place));
-        let reach = TWO_SIDED
-            * (best.covariance[number][number] * attribution.inflation)
-                .max(0.0)
-                .sqrt();
+        let own = candidate.own[place.1];
+        let variance = (best.covariance[number][number] * attribution.inflation).max(0.0);
+        let reach = TWO_SIDED * variance.sqrt().hypotenuse(SIMULATORS * (value - own));
         Profile {
             member: best.causes.iter().position(|cause| *cause == place.0).unwrap_or(0),
             name: knob.name,
             unit: knob.unit(),
             value,
             interval: [value - reach, value + reach].map(|end| end.clamp(low, high)),
-            own: candidate.own[place.1],
+            own,
             curve: vec![(value, 0.0)],
         }
     };

@@ -160,6 +160,17 @@ fn an_input_filter_of_a_converter_that_steps_far_down_is_found() {
     }
 }
 
+/// A cable of which the fit held the inductance at the lowest that is tried, when the budget of the search was at its end. Its interval was a point: no
+/// variance is no certainty.
+#[test]
+fn behind_the_budget_no_interval_is_a_point() {
+    let findings = findings("cable_behind_the_budget", &["judge.csv"]);
+    assert!(ids(&findings).contains(&"cable"), "{}", findings.sentence);
+    for (name, found) in findings.causes.iter().flat_map(|cause| &cause.parameters) {
+        assert!(found.high - found.low > 1e-4 * found.value.abs(), "{name}: {found:?}");
+    }
+}
+
 /// A real converter of 24 V that remembers, of a data set of SysIdentPy (LICENSE in its folder), held against a model whose numbers are guesses. Causes leave
 /// nothing of it but a doubt, so that none is believed; a tuned black box reaches 0.44 V where nothing is fed back.
 #[test]

@@ -40,6 +40,8 @@ const MAIN_PART: f64 = 0.25;
 const FEWEST_ROWS: usize = 50;
 /// Fewest records that are left, so that not a single run decides.
 const FEWEST_RECORDS: usize = 2;
+/// A cause that holds leaves at most this share of a held-out record's error above the noise: nine tenths are `mostly_explained`.
+const MOSTLY: f64 = 0.1;
 /// The causes may make what was set aside this much worse, in squares, since what disturbs it may run against them: an effect and a
 /// disturbance of one size that follow each other to .6 do so by 1.25. A convention above it.
 const WORSE: f64 = 1.5;
@@ -292,7 +294,7 @@ fn helps(pair: &Pair, found: &Examined) -> bool {
 /// Whether one channel is enough to tell of the causes, where no other is left beside the one that was set aside: only with a held-out record, and of
 /// records that are read as they were made (a duty that waits is a shift of rows as well). Not of an instrument, which would be the one that is left. In
 /// the held-out record the other channel may be off by more, since what disturbs it may run against the causes, but a cause that takes it much further off is
-/// one of a bent fit, unless the channel that is left has nothing of what is left in the other. That has to be so of an inductor's curve where its current is
+/// one of a bent fit, unless it holds there and the channel that is left has nothing of what is left in the other. That has to be so of an inductor's curve where its current is
 /// set aside: where it is another than the law's it bends to the voltage, and the current shows it.
 fn tells_alone(part: Part, found: &Examined, whole: &Examined, heldout: &[Record], base: &Model) -> bool {
     let Part::Channel(n) = part else { return true };
@@ -322,18 +324,22 @@ fn tells_alone(part: Part, found: &Examined, whole: &Examined, heldout: &[Record
     let trim = state.starts.trim_or_none(base.plant.converter.f_sw);
     let pair = held(&whole.problem, heldout, base, state, trim);
     pair.is_some_and(|pair| {
+        let problem = &pair.problem;
         let of = |state: &State| -> f64 {
-            let records = 0..pair.problem.records.len();
-            let values = records.flat_map(|record| noise::channel(&pair.problem, &state.residual, record, n));
+            let records = 0..problem.records.len();
+            let values = records.flat_map(|record| noise::channel(problem, &state.residual, record, n));
             values.map(|left| left * left).sum()
         };
         // what the other channel would have to show, and has not: an instrument does that, however much the cause had hidden of it
         let is_missing = || {
-            let mut records = 0..pair.problem.records.len();
-            records.all(|record| shape::is_missing_elsewhere(&pair.problem, &pair.after, (record, n)))
+            let mut records = 0..problem.records.len();
+            records.all(|record| shape::is_missing_elsewhere(problem, &pair.after, (record, n)))
         };
+        // ... where the cause holds: a voltage that stands still lacks everything
+        let left = |state: &State| above(problem, state, |_, channel| channel != n);
+        let holds = left(&pair.after) <= MOSTLY * left(&pair.before);
         let is_of_current = causes.iter().any(|cause| cause.id == "l_saturation") && n == INDUCTOR_CURRENT;
-        !is_of_current && of(&pair.after) <= MUCH_WORSE * of(&pair.before) || is_missing()
+        !is_of_current && of(&pair.after) <= MUCH_WORSE * of(&pair.before) || holds && is_missing()
     })
 }
 

@@ -302,7 +302,8 @@ fn tells_alone(part: Part, found: &Examined, whole: &Examined, heldout: &[Record
     if n == V_IN {
         return true;
     }
-    let others = (0..CHANNELS).filter(|other| *other != n && whole.problem.sigma[*other].is_finite());
+    let tells = |other: &usize| ![n, V_IN].contains(other) && whole.problem.sigma[*other].is_finite();
+    let others = (0..CHANNELS).filter(tells);
     if others.count() > 1 {
         return true;
     }

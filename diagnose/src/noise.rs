@@ -62,7 +62,7 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
         };
         // the median: one noisy record must not hide what the others show
         let typical = middle((0..problem.records.len()).map(of)) * few::unsure(problem, n);
-        let scale = scale(problem, n);
+        let scale = problem.scale(n);
         let least = least(problem, n);
         let has = problem
             .records
@@ -79,10 +79,6 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
     })
 }
 
-fn scale(problem: &Problem, n: usize) -> f64 {
-    [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n]
-}
-
 /// The least noise of a channel, V or A: what its digits, its meter and the simulators are, whatever its values happen to scatter by.
 #[must_use]
 pub(crate) fn least(problem: &Problem, n: usize) -> f64 {
@@ -90,7 +86,7 @@ pub(crate) fn least(problem: &Problem, n: usize) -> f64 {
     let lattice = steps.fold(0.0, f64::max);
     // step / sqrt 12: the standard deviation of rounding
     (lattice / 12f64.sqrt())
-        .max(least_share(problem) * scale(problem, n))
+        .max(least_share(problem) * problem.scale(n))
         .max(stuck(problem, n))
         .max(few::steps(problem, n))
         .max(few::rounded(problem, n))
@@ -112,7 +108,6 @@ const TOO_CLEAN: f64 = 2e-5;
 /// What to say of records over time that are too clean to be measured; `residual` is that of the model as given.
 #[must_use]
 pub fn too_clean(problem: &Problem, residual: &[f64]) -> Option<String> {
-    let scales = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in];
     let clean = |(index, record): (usize, &Record)| {
         let is_clean = |n: &usize| {
             let shown: Vec<f64> = channel(problem, residual, index, *n)
@@ -121,7 +116,7 @@ pub fn too_clean(problem: &Problem, residual: &[f64]) -> Option<String> {
                 .collect();
             let noise = scatter(&shown, |_| true) * problem.sigma[*n];
             // a coarse converter hides what noise there is
-            noise < TOO_CLEAN * scales[*n] && record.lattice[*n] < TOO_CLEAN * scales[*n]
+            noise.max(record.lattice[*n]) < TOO_CLEAN * problem.scale(*n)
         };
         let has = |n: &usize| record.measured[*n].iter().any(|v| v.is_finite());
         let mut measured = (0..2).filter(has).peekable();

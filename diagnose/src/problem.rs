@@ -153,6 +153,11 @@ fn in_steps(record: &Record) -> [Vec<bool>; CHANNELS] {
 }
 
 impl Problem {
+    /// Size of a channel's signals, V or A.
+    pub(crate) fn scale(&self, n: usize) -> f64 {
+        [self.bases.v, self.bases.i, self.bases.i, self.bases.v_in][n]
+    }
+
     /// Leaves single rows out of every sum.
     pub fn leave_out(&mut self, rows: &[Outlier]) {
         for one in rows {

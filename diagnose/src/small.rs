@@ -64,11 +64,6 @@ pub fn freedom(problem: &Problem) -> Option<String> {
     (most < 6).then(said)
 }
 
-/// Size of a channel's signals.
-fn scale(problem: &Problem, n: usize) -> f64 {
-    [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n]
-}
-
 /// Mean square of `count` values over that of the noise which these values show by their second differences: noise is above it once in a
 /// thousand channels.
 // the 99.9 % quantile of that ratio, over `noise::few::unsure` squared, in 200,000 draws of white noise each: 14.8, 8.6, 5.6, 4.3, 4.9, 3.1
@@ -127,7 +122,7 @@ pub(crate) fn disorder(problem: &Problem, state: &State, index: usize) -> Option
     let record = &problem.records[index];
     let values = noise::channel(problem, &state.residual, index, 0);
     let sigma = problem.sigma[0];
-    if record.settled || sigma < NOISY * scale(problem, 0) {
+    if record.settled || sigma < NOISY * problem.scale(0) {
         return None;
     }
     let counted = (0..values.len()).filter(|row| values[*row] != 0.0);

@@ -77,6 +77,14 @@ fn a_voltage_that_stands_still_lets_no_cause_hold() {
     assert_eq!(findings.verdict, Verdict::Unexplained, "{}", findings.sentence);
 }
 
+/// Rows in another order than they were taken. With the load's current set aside the voltage alone says that a cable is there; that the source's voltage was
+/// measured as well bears that out no more.
+#[test]
+fn rows_in_another_order_are_no_cable() {
+    let findings = findings("permuted_rows", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::Unexplained, "{}", findings.sentence);
+}
+
 /// An inductor current that creeps; the voltage shows the curve of the core by itself, and nothing of the creeping.
 #[test]
 fn the_curve_of_a_core_is_named_beside_a_current_that_creeps() {

@@ -25,6 +25,11 @@ const LEAST_OF_PART: u64 = 7_000_000;
 /// Rows within which a whole search without a part has to begin and to have looked at every cause alone once more.
 // of 1,440 rows, three periods each, it took 32 million behind 59, in vain; at 45 million a diode beside a channel set aside is missed, at 55 it is found
 const ROWS_OF_ALL: u64 = 55_000_000;
+/// Rows that a look at all causes at first order may take which only tells whether a search is worth it: as many as a search in a part takes.
+// beside a cable of 17 nH and a load that lags it took 25 million, and the search 10 (buck-boost, 400 rows of a square law)
+const ROWS_OF_LOOK: u64 = 10_000_000;
+/// Share of them from which on the rest is reckoned: some causes are dearer than others.
+const OF_LOOK: f64 = 0.25;
 /// Rows in which terms of an empirical correction are sought; the one that is begun is brought to its end.
 // a term takes 2 million in records of a thousand rows, and there are at most seven
 const ROWS_OF_TERMS: u64 = 20_000_000;
@@ -135,6 +140,11 @@ impl Work {
     /// Whether a fit has taken all that it may, of records that take `given` rows as the model was given.
     pub(crate) fn is_fit_over(rows: u64, given: u64) -> bool {
         rows > ROWS_OF_FIT.max(given.saturating_mul(SIMULATIONS_OF_FIT))
+    }
+
+    /// Whether a look at all causes goes on that has taken so many rows for this share of them.
+    pub(crate) fn is_look_worth_it(taken: u64, share: f64) -> bool {
+        taken as f64 <= ROWS_OF_LOOK as f64 * share.max(OF_LOOK)
     }
 
     fn count(&self, rows: u64) {

@@ -203,8 +203,8 @@ impl Searcher<'_> {
             && !is_spoilt
             && best.values.len() < most
             && !self.is_hopeless(&best, before)
-            && !self.is_out_of_reach(&best.state, &|_| false)
             && self.fitter.problem.work.goes_on()
+            && !self.is_out_of_reach(&best.state, &|_| false)
         {
             let mut larger = self.larger(&best, &leaders);
             if best.causes.len() == 1 && larger.iter().all(|fit| self.structure(fit) > 0.0) {

@@ -1,12 +1,13 @@
 //! Whether a fit is worth what it has more than another.
 
-use super::Searcher;
+use super::{LOOKS_AT_ONCE, Searcher};
 use crate::causes::Search;
 use crate::fit::{Fit, State};
 use crate::level::{ACCURACY, threshold};
 use crate::parallel;
 use crate::problem::{axpy, dot};
 use crate::shape::structures;
+use crate::work::Work;
 
 /// A search ends with two causes where they leave this mean square over that of the noise, and this share of what there was: a third of
 /// the error. Where two causes are hidden the best two leave next to nothing; three are never hidden. Conventions.
@@ -90,13 +91,27 @@ impl Searcher<'_> {
         if before < WELL_ABOVE * count || self.left_by(state) == 0.0 {
             return false;
         }
-        let all: Vec<usize> = (0..self.fitter.candidates.len()).collect();
-        let directions = parallel::map(&all, |cause| {
-            let own = self.directions(*cause, state).into_iter();
-            own.map(rest).collect::<Vec<_>>()
-        });
-        let after = without(&mut left, directions.into_iter().flatten());
+        let Some(directions) = self.all_directions(state) else {
+            return false;
+        };
+        let after = without(&mut left, directions.into_iter().map(rest));
         after > WELL_ABOVE * count && after > OUT_OF_REACH * before
+    }
+
+    /// Where all candidates can move the signals at first order; nothing if that takes longer than the search that it may save.
+    fn all_directions(&self, from: &State) -> Option<Vec<Vec<f64>>> {
+        let all: Vec<usize> = (0..self.fitter.candidates.len()).collect();
+        let work = &self.fitter.problem.work;
+        let begun_at = work.rows();
+        let mut directions = Vec::new();
+        for (done, some) in all.chunks(LOOKS_AT_ONCE).enumerate() {
+            let share = (done * LOOKS_AT_ONCE) as f64 / all.len() as f64;
+            if !Work::is_look_worth_it(work.rows().saturating_sub(begun_at), share) {
+                return None;
+            }
+            directions.extend(parallel::map(some, |cause| self.directions(*cause, from)));
+        }
+        Some(directions.into_iter().flatten().collect())
     }
 
     /// Where a candidate can move the signals at first order: along its tangents, and to where its fit may begin and along those there.

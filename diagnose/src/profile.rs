@@ -254,7 +254,8 @@ fn scale(candidate: &Candidate, sigma: f64, step: f64) -> f64 {
 }
 
 /// [`parabolas`], and the curve itself of a parameter that has none: a counter, or one that the fit held at an end. A few fits.
-fn behind_the_budget(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
+#[must_use]
+pub fn behind_the_budget(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
     let mut all = parabolas(problem, attribution);
     let Some(best) = &attribution.best else { return all };
     let fitter = attribution.fitter(problem);

@@ -84,6 +84,22 @@ fn stretch(x: &mut X, leads: Leads, is_on: bool, share: f64, load: f64) {
     integrate(x, h, steps, |x| slope(x, leads, is_on, load));
 }
 
+/// Short leads to ceramics: they swing at .65 and .82 of the rows' rate.
+const CERAMIC: [Leads; 2] = [
+    Leads {
+        resistance: 0.08,
+        inductance: 0.3e-6,
+        c_in: 2.2e-6,
+        esr_in: 0.02,
+    },
+    Leads {
+        resistance: 0.12,
+        inductance: 0.09e-6,
+        c_in: 4.7e-6,
+        esr_in: 0.005,
+    },
+];
+
 /// From each row on: duty and current of an electronic load.
 fn record(leads: Leads, course: &[(usize, f64, f64)], seed: u64) -> Table {
     let (mut x, mut random) = ([course[0].2, 5.0, V_IN, 1.0], Noise(seed));
@@ -214,4 +230,12 @@ fn the_inductor_s_current_alone_shows_the_leads_of_a_buck_boost() {
     let cause = &findings.causes[0];
     let mut names = cause.rivals.iter().flatten().copied().chain([cause.id]);
     assert!(names.any(|id| id == "source_impedance"), "{}", findings.sentence);
+}
+
+/// A filter that swings above half of the rows' rate looks like slower ones: five of these eight values lay outside when its fit began at those alone.
+#[test]
+fn a_filter_that_swings_faster_than_half_of_the_rows_rate_is_found() {
+    let runs = [missed(CERAMIC[0], &[], 606), missed(CERAMIC[1], &[], 607)];
+    let (out, all) = runs.iter().fold((0, 0), |sum, run| (sum.0 + run.0, sum.1 + run.1));
+    assert!(all == 8 && out <= 1, "{runs:?}");
 }

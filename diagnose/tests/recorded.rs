@@ -5,7 +5,8 @@
 mod folder;
 
 use diagnose::findings::{Findings, Verdict};
-use folder::{findings, ids};
+use diagnose::profile::behind_the_budget;
+use folder::{diagnosed, findings, ids};
 
 /// The value of `id` in the tie of the only cause, as the cause itself or as a rival.
 fn in_tie(findings: &Findings, id: &str) -> Option<f64> {
@@ -160,14 +161,41 @@ fn an_input_filter_of_a_converter_that_steps_far_down_is_found() {
     }
 }
 
-/// A cable of which the fit held the inductance at the lowest that is tried, when the budget of the search was at its end. Its interval was a point: no
-/// variance is no certainty.
+/// Cables whose inductance has several valleys: of 15 nH, that swings with its capacitor in two rows, and of 2.1 uH, that swings at 1.13 times half of the
+/// rows' rate. The fits ended at .7 nH, with an offset of a meter beside it, and at .28 uH, and said that they had explained the records.
+#[test]
+fn a_cable_is_found_in_its_own_valley() {
+    let beside = [
+        ("inductance", 15.03e-9),
+        ("resistance", 0.000914),
+        ("capacitance", 116.83e-6),
+    ];
+    let above = [
+        ("inductance", 2.0978e-6),
+        ("resistance", 0.27377),
+        ("capacitance", 0.42543e-6),
+    ];
+    for (folder, hidden) in [("cable_beside_a_valley", beside), ("cable_above_half_the_rate", above)] {
+        let findings = findings(folder, &["judge.csv"]);
+        assert_eq!(findings.verdict, Verdict::Explained, "{}", findings.sentence);
+        assert_eq!(ids(&findings), ["cable"], "{}", findings.sentence);
+        for (name, hidden) in hidden {
+            let found = &findings.causes[0].parameters[name];
+            assert!((found.value / hidden - 1.0).abs() < 0.05, "{name}: {found:?}");
+        }
+    }
+}
+
+/// Behind the budget intervals are read off covariances. That of a parameter which the fit held at an end is 0, and its interval was a point (697.4 pH to
+/// 697.4 pH): no variance is no certainty.
 #[test]
 fn behind_the_budget_no_interval_is_a_point() {
-    let findings = findings("cable_behind_the_budget", &["judge.csv"]);
-    assert!(ids(&findings).contains(&"cable"), "{}", findings.sentence);
-    for (name, found) in findings.causes.iter().flat_map(|cause| &cause.parameters) {
-        assert!(found.high - found.low > 1e-4 * found.value.abs(), "{name}: {found:?}");
+    let mut diagnosis = diagnosed("short_cable", &[]);
+    let best = diagnosis.attribution.best.as_mut().unwrap();
+    best.covariance[0].fill(0.0);
+    for profile in behind_the_budget(&diagnosis.problem, &diagnosis.attribution) {
+        let [low, high] = profile.interval;
+        assert!(high - low > 1e-4 * profile.value.abs(), "{profile:?}");
     }
 }
 

@@ -9,6 +9,7 @@ mod singles;
 pub(crate) mod sought;
 mod spoilt;
 mod starts;
+mod valleys;
 mod weigh;
 
 pub(crate) use spoilt::WithoutChannel;

@@ -20,13 +20,6 @@ const STILL_OFF: f64 = 1.25;
 /// which in filters of blind cases took up to .61 of it. A convention below that.
 const KEPT: f64 = 0.2;
 
-/// Numbers of a cause from which on one of them may be lost while the others are still wrong.
-const MANY: usize = 3;
-/// Where such a number begins once more, as ratios to its lowest: half a decade apart.
-const DECADES: [f64; 6] = [2.0, 6.0, 20.0, 60.0, 200.0, 600.0];
-/// Share of the squares that such a cause leaves at most. A convention: a tenth of what there was.
-const NEARLY_ALL: f64 = 0.1;
-
 impl Searcher<'_> {
     /// Every candidate alone. Those that explain next to nothing at first order are not followed further.
     pub fn singles(&self, stage: &str) -> Vec<Fit> {
@@ -73,30 +66,6 @@ impl Searcher<'_> {
             fits[cause] = better;
         }
         fits
-    }
-
-    /// The best single cause, of three numbers and more, begun once more with its first number anywhere in its decades and the others as found, where
-    /// it takes nearly all and leaves structure: of a short cable the inductance hardly shows, and a fit had gone past it while the capacitance was
-    /// still wrong.
-    fn begun_once_more(&self, fits: &[Fit]) -> Option<(usize, Fit)> {
-        let (cause, best) = fits
-            .iter()
-            .enumerate()
-            .min_by(|a, b| a.1.state.chi2.total_cmp(&b.1.state.chi2))?;
-        let is_listed = matches!(self.search(cause), Search::From(_)) && best.values.len() >= MANY;
-        let share = best.state.chi2 / self.fitter.null.chi2;
-        if !is_listed || share > NEARLY_ALL || self.structure(best) == 0.0 || !self.fitter.problem.work.goes_on() {
-            return None;
-        }
-        let [low, high, _] = self.fitter.candidates[cause].ranges[0];
-        let begun = parallel::map(&DECADES, |times| {
-            let mut values = best.values.clone();
-            values[0] = times * low;
-            (low > 0.0 && times * low < high).then(|| self.fitter.from(&[cause], &values, self.fitter.null))
-        });
-        let begun = begun.into_iter().flatten();
-        let found = begun.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2))?;
-        (found.state.chi2 < best.state.chi2).then_some((cause, found))
     }
 
     /// An input filter from the resistance that fits without one, and from what swings beside it, where that is better: what the resistance

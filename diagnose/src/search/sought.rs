@@ -79,11 +79,40 @@ pub(crate) fn damped(bases: &Bases) -> Vec<Vec<f64>> {
     frequencies.flat_map(|frequency| filters(frequency, bases)).collect()
 }
 
+/// Lowest and highest frequency of filters that are looked at wherever they swing, as shares of the switching frequency: below it the rows show each turn,
+/// above it an inductance of leads is nothing beside that of the circuit. Conventions.
+const ANY: [f64; 2] = [0.05, 3.0];
+/// Impedances of those: a decade, half of a decade apart from end to end, around the two that others begin with.
+const ANY_IMPEDANCES: [f64; 4] = [0.01, 0.03, 0.1, 0.3];
+
+/// Input filters behind a resistance at any frequency, each a `ratio` above the one before; several of other impedances at each.
+pub(crate) fn filters_at_any(resistance: f64, ratio: f64, bases: &Bases) -> Vec<Vec<Vec<f64>>> {
+    let [low, high] = ANY;
+    let count = (libm::log(high / low) / libm::log(ratio)) as i32;
+    let at = |n: i32| {
+        let of = |mut filter: Vec<f64>| {
+            filter[0] = resistance;
+            filter
+        };
+        let frequency = low / bases.t_sw * ratio.powi(n);
+        of_impedances(frequency, bases, ANY_IMPEDANCES).map(of).to_vec()
+    };
+    (0..=count).map(at).collect()
+}
+
 /// Input filters that swing at a frequency.
 fn filters(frequency: f64, bases: &Bases) -> [Vec<f64>; 2] {
+    of_impedances(frequency, bases, IMPEDANCES)
+}
+
+/// Numbers of an input filter.
+pub(crate) const OF_FILTER: usize = 4;
+
+/// ... of these impedances.
+fn of_impedances<const N: usize>(frequency: f64, bases: &Bases, impedances: [f64; N]) -> [Vec<f64>; N] {
     let seen = bases.v_in * bases.v_in / (bases.v * bases.i);
     let rate = TAU * frequency;
-    IMPEDANCES.map(|share| {
+    impedances.map(|share| {
         let z = share * seen;
         vec![0.5 * DAMPED * z, z / rate, 1.0 / (z * rate), 0.5 * DAMPED * z]
     })

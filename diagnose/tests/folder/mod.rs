@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use diagnose::diagnosis::diagnose;
+use diagnose::diagnosis::{Diagnosis, diagnose};
 use diagnose::findings::Findings;
 use diagnose::record::Record;
 use measured::{ColumnMap, Sheet};
@@ -10,6 +10,11 @@ use plant::Parameters;
 
 /// What is said of the first one or two records of a folder, and of those that judge.
 pub fn findings(folder: &str, judges: &[&str]) -> Findings {
+    diagnosed(folder, judges).findings
+}
+
+/// The whole diagnosis of them.
+pub fn diagnosed(folder: &str, judges: &[&str]) -> Diagnosis {
     let path = |name: &str| -> PathBuf {
         let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/recorded");
         tests.join(folder).join(name)
@@ -27,9 +32,9 @@ pub fn findings(folder: &str, judges: &[&str]) -> Findings {
     let train = ["first.csv", "second.csv"].iter().filter(|name| path(name).exists());
     let train = train.map(read).collect();
     let held: Vec<Record> = judges.iter().map(read).collect();
-    let findings = diagnose(&model, train, &held, &|_| ()).findings;
-    println!("{}", findings.sentence);
-    findings
+    let diagnosis = diagnose(&model, train, &held, &|_| ());
+    println!("{}", diagnosis.findings.sentence);
+    diagnosis
 }
 
 /// The causes that are named.

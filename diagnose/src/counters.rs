@@ -7,7 +7,7 @@
 //! true: the interval goes on to the smallest and the largest of them that the held-out records allow as well.
 
 use crate::attribute::Attribution;
-use crate::causes::{Cut, Search};
+use crate::causes::Cut;
 use crate::drive::Model;
 use crate::duty_steps::{self, Alike};
 use crate::examine::{Examined, named};
@@ -167,10 +167,7 @@ impl<'a> Counter<'a> {
 
 /// How a counter rounds; nothing for other causes.
 fn cut(attribution: &Attribution, cause: usize) -> Option<Cut> {
-    match attribution.candidates[cause].form.search {
-        Search::Counter(cut) => Some(cut),
-        _ => None,
-    }
+    attribution.candidates[cause].form.cut()
 }
 
 /// What to say of a counter that the records tell from no other.

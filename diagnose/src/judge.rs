@@ -1,6 +1,5 @@
 //! Held-out records as judges of what training records say.
 
-use crate::causes::Search;
 use crate::doubts::Doubt;
 use crate::drive::Model;
 use crate::examine::{Examined, named};
@@ -144,7 +143,7 @@ impl Examined {
     fn counted_otherwise(&mut self, heldout: &[Record], base: &Model) -> Option<Pair> {
         let (problem, attribution) = (&self.problem, &self.attribution);
         let best = attribution.best.as_ref()?;
-        let is_counter = |cause: usize| matches!(attribution.candidates[cause].form.search, Search::Counter(_));
+        let is_counter = |cause: usize| attribution.candidates[cause].form.cut().is_some();
         let own = best.causes.iter().copied().find(|cause| is_counter(*cause))?;
         let most = best.state.chi2 + BY_CHANCE * threshold(best.values.len(), attribution.inflation);
         let others = attribution.singles.iter().filter(|fit| {

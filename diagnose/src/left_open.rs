@@ -6,7 +6,7 @@
 //! well.
 
 use crate::attribute::Attribution;
-use crate::causes::{Cut, Search};
+use crate::causes::Cut;
 use crate::drive::Model;
 use crate::fit::Fit;
 use crate::gain::Pair;
@@ -49,12 +49,9 @@ pub fn chosen(
 ) -> Option<Chosen> {
     let best = attribution.best.as_ref()?;
     let fitter = attribution.fitter(problem);
-    let cut = |number: &usize| match attribution.candidates[fitter.places(&best.causes)[*number].0]
-        .form
-        .search
-    {
-        Search::Counter(cut) => Some(cut),
-        _ => None,
+    let cut = |number: &usize| {
+        let cause = fitter.places(&best.causes)[*number].0;
+        attribution.candidates[cause].form.cut()
     };
     let numbers =
         || (0..profiles.len().min(best.values.len())).filter(|number| problem.work.goes_on() || cut(number).is_some());

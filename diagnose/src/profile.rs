@@ -6,7 +6,7 @@ mod side;
 use std::cell::{Cell, RefCell};
 
 use crate::attribute::Attribution;
-use crate::causes::{Candidate, Search};
+use crate::causes::Candidate;
 use crate::exact::Exact;
 use crate::fit::{Fit, Fitter};
 use crate::problem::Problem;
@@ -184,7 +184,7 @@ impl<'a> Along<'a> {
             curve: vec![(value, 0.0)],
         };
         let cost = |x: f64| self.cost(x);
-        if matches!(candidate.form.search, Search::Counter(_)) {
+        if candidate.form.cut().is_some() {
             profile.interval = [-1.0, 1.0].map(|side| alike(value, side, &cost));
         }
         if !self.fitter.is_smooth(place) {

@@ -1,7 +1,6 @@
 //! Causes that a fit took and that are none: they are taken out, and the others are fitted again.
 
 use crate::attribute::{Attribution, SURE};
-use crate::causes::Search;
 use crate::coloured;
 use crate::fit::{Fit, State};
 use crate::level::threshold;
@@ -46,7 +45,7 @@ impl Attribution {
             // to which counts a duty is rounded nobody knows where the duty itself goes to and fro; but of a counter that makes all of it the line may
             // be, where a bench steps its duty in a rhythm
             let makes_all = self.evidence[*member] > ALL_OF_IT * (self.null.chi2 - problem.count() as f64);
-            let is_of_counts = beside_line && !makes_all && matches!(form.search, Search::Counter(_));
+            let is_of_counts = beside_line && !makes_all && form.cut().is_some();
             let inflation = scatter[*member].max(sure * self.inflation);
             let chance = self.chance(problem, *member) * inflation;
             let evidence = match chance > 0.0 {
@@ -88,8 +87,8 @@ impl Attribution {
         let places = self.fitter(problem).places(&best.causes);
         let number = places.iter().position(|place| place.0 == best.causes[member]);
         let step = number.and_then(|number| best.values.get(number));
-        match (self.candidates[best.causes[member]].form.search, step) {
-            (Search::Counter(_), Some(step)) if *step > 0.0 => {
+        match (self.candidates[best.causes[member]].form.cut(), step) {
+            (Some(_), Some(step)) if *step > 0.0 => {
                 let mut duties: Vec<f64> = problem.records.iter().flat_map(|r| r.duty.iter().copied()).collect();
                 duties.sort_by(f64::total_cmp);
                 duties.dedup();

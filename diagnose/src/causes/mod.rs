@@ -121,6 +121,14 @@ impl Form {
         matches!(self.search, Search::Own | Search::OwnOr(_))
     }
 
+    /// How a counter of the duty rounds; nothing for other causes.
+    pub(crate) fn cut(&self) -> Option<Cut> {
+        match self.search {
+            Search::Counter(cut) => Some(cut),
+            _ => None,
+        }
+    }
+
     /// Whether its first parameter is varied continuously.
     #[must_use]
     pub fn is_smooth(&self) -> bool {

@@ -291,7 +291,7 @@ impl Searcher<'_> {
         let mut fine = fitter.from(&fit.causes, &fit.values, &fit.state);
         // initial states and instants by what they do here: what they did in the model as given leaves kicks where its filter rings otherwise
         fine.state = State::settle(self.fitter.problem, &fine.state.model, &fine.state.starts, None);
-        let is_step = |place: &(usize, usize)| matches!(self.search(place.0), Search::Counter(_));
+        let is_step = |place: &(usize, usize)| self.fitter.candidates[place.0].form.cut().is_some();
         match fitter.places(&fit.causes).iter().position(is_step) {
             Some(place) => self.counted(fine, place),
             None => fine,

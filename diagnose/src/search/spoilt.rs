@@ -6,7 +6,6 @@
 use super::{Known, LOOKED_AT, Searcher, Set};
 use crate::aside::may_miss;
 use crate::attribute::SURE;
-use crate::causes::Search;
 use crate::fit::{Fit, Fitter, State};
 use crate::level::threshold;
 use crate::noise;
@@ -89,7 +88,7 @@ fn counters(fitter: &Fitter<'_>) -> Vec<Fit> {
         known: Known::default(),
     };
     let all = 0..fitter.candidates.len();
-    all.filter(|cause| matches!(search.search(*cause), Search::Counter(_)))
+    all.filter(|cause| fitter.candidates[*cause].form.cut().is_some())
         .map(|cause| search.added(&Set::NONE, cause, fitter.null))
         .collect()
 }

@@ -152,3 +152,14 @@ fn each_record_begins_somewhere_in_a_line_of_the_source() {
     let held = findings.gain.heldout.iter().find(|held| held.channel == "v_o").unwrap();
     assert!(held.rmse_after < 1.1 * held.floor, "{held:?}");
 }
+
+/// A line of 778 Hz in records of one to two turns. The clock of the held-out record was .009 turns off, and the cause was refuted by that.
+#[test]
+fn the_clock_of_a_record_of_few_turns_is_where_its_line_fits() {
+    let findings = findings("line_of_few_turns", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::Explained, "{}", findings.sentence);
+    assert_eq!(ids(&findings), ["input_ripple"], "{}", findings.sentence);
+    let of = |name: &str| &findings.causes[0].parameters[name];
+    assert!((of("frequency").value - 777.99).abs() < 3.0, "{}", findings.sentence);
+    assert!((of("ripple").value - 0.14457).abs() < 0.002, "{}", findings.sentence);
+}

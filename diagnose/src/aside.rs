@@ -23,6 +23,7 @@ use crate::held_out::held;
 use crate::instants;
 use crate::level::threshold;
 use crate::noise;
+use crate::preflight::Misread;
 use crate::problem::{Problem, dot};
 use crate::progress::{Listener, Progress};
 use crate::record::{CHANNEL_NAMES, CHANNELS, LOAD_CURRENT, Record, V_IN};
@@ -311,12 +312,15 @@ fn tells_alone(part: Part, found: &Examined, whole: &Examined, heldout: &[Record
     let causes = attribution.best.iter().flat_map(|best| &best.causes);
     let causes: Vec<&'static Cause> = causes.map(|cause| attribution.candidates[*cause].cause).collect();
     // what the instrument that is set aside may do by itself is no other reading of what is left
-    let is_its_own =
-        |words: &String| (whole.misread.iter()).any(|one| one.words == *words && one.may_be_an_instrument(n));
-    let is_misread = (whole.doubts.iter()).any(|doubt| matches!(doubt, Doubt::Bench(words) if !is_its_own(words)));
+    let is_misread = |cause: &Cause| {
+        // nor is another source where that is the cause
+        let is_no_other = |one: &Misread| one.may_be_an_instrument(n) || one.is_said_by(cause.id);
+        let is_known = |words: &String| (whole.misread.iter()).any(|one| one.words == *words && is_no_other(one));
+        (whole.doubts.iter()).any(|doubt| matches!(doubt, Doubt::Bench(words) if !is_known(words)))
+    };
     let is_odd = |cause: &&Cause| {
         let is_late = cause.id == "duty_delay";
-        is_misread && !is_late || cause.kind == Kind::Instrument
+        !is_late && is_misread(cause) || cause.kind == Kind::Instrument
     };
     if causes.iter().any(is_odd) {
         return false;

@@ -79,6 +79,11 @@ impl Misread {
         }
     }
 
+    /// Whether a cause says the same.
+    pub(crate) fn is_said_by(&self, cause: &str) -> bool {
+        matches!(self.reading, Reading::Source(_)) && cause == "v_in_wrong"
+    }
+
     /// Whether a cause that explains the records speaks against it: the record cannot be both.
     #[must_use]
     pub fn is_refuted_by_a_cause(&self) -> bool {

@@ -108,3 +108,14 @@ fn beside_the_source_one_channel_is_enough() {
         ("time_constant", 1.172e-5),
     );
 }
+
+/// A source of 33.39 V in the place of 31, which its meter shows, and a current that sticks. What looked like another source before any fit had left the voltage
+/// without a witness, though the cause says the same.
+#[test]
+fn another_source_is_named_beside_a_current_that_sticks() {
+    let findings = findings("source_beside_backlash", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::MostlyExplained, "{}", findings.sentence);
+    assert_eq!(ids(&findings), ["v_in_wrong"], "{}", findings.sentence);
+    let v_in = &findings.causes[0].parameters["v_in"];
+    assert!((v_in.value - 33.3857).abs() < 0.02, "{}", findings.sentence);
+}

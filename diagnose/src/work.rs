@@ -33,6 +33,9 @@ const OF_LOOK: f64 = 0.25;
 /// Rows in which terms of an empirical correction are sought; the one that is begun is brought to its end.
 // a term takes 2 million in records of a thousand rows, and there are at most seven
 const ROWS_OF_TERMS: u64 = 20_000_000;
+/// And in which they are sought with all before them, but for a first few: what took the whole budget in vain took 27 s of a core with five terms behind it.
+const ROWS_WITH_TERMS: u64 = 34_000_000;
+const LEAST_OF_TERMS: u64 = 4_000_000;
 /// Steps of the integrator that take as long as a row of a plain converter.
 // a quarter of a microsecond each, on the core that does a million rows
 const STEPS: u64 = 4;
@@ -178,7 +181,8 @@ impl Work {
 
     /// Whether another term may be sought, where the first began at so many rows.
     pub(crate) fn may_add_a_term(&self, begun_at: u64) -> bool {
-        self.rows() < begun_at.saturating_add(ROWS_OF_TERMS)
+        let most = ROWS_WITH_TERMS.max(begun_at.saturating_add(LEAST_OF_TERMS));
+        self.rows() < most.min(begun_at.saturating_add(ROWS_OF_TERMS))
     }
 
     /// Whether half of it is left, for what is tried where two searches have failed; what may not begin is remembered.

@@ -82,7 +82,7 @@ pub(crate) fn damped(bases: &Bases) -> Vec<Vec<f64>> {
 /// Lowest and highest frequency of filters that are looked at wherever they swing, as shares of the switching frequency: below it the rows show each turn,
 /// above it an inductance of leads is nothing beside that of the circuit. Conventions.
 const ANY: [f64; 2] = [0.05, 3.0];
-/// Impedances of those: a decade, half of a decade apart from end to end, around the two that others begin with.
+/// Impedances of those: half a decade apart, around the two that others begin with.
 const ANY_IMPEDANCES: [f64; 4] = [0.01, 0.03, 0.1, 0.3];
 
 /// Input filters behind a resistance at any frequency, each a `ratio` above the one before; several of other impedances at each.
@@ -105,8 +105,16 @@ fn filters(frequency: f64, bases: &Bases) -> [Vec<f64>; 2] {
     of_impedances(frequency, bases, IMPEDANCES)
 }
 
-/// Numbers of an input filter.
-pub(crate) const OF_FILTER: usize = 4;
+/// A filter swings fast in less than so many rows. A convention: of six rows each turn shows.
+const FAST: f64 = 6.0;
+
+/// Whether an input filter of these numbers swings fast, or not at all.
+pub(crate) fn is_fast(values: &[f64], bases: &Bases) -> bool {
+    let [_, inductance, capacitance, ..] = values else {
+        return false;
+    };
+    TAU * libm::sqrt(inductance * capacitance) < FAST * bases.t_sw
+}
 
 /// ... of these impedances.
 fn of_impedances<const N: usize>(frequency: f64, bases: &Bases, impedances: [f64; N]) -> [Vec<f64>; N] {

@@ -39,17 +39,21 @@ impl Searcher<'_> {
 
     /// Starts in the deepest valleys, the numbers that make none as found; of an input filter beside the source's `resistance`.
     fn valleys(&self, cause: usize, best: &Fit, resistance: f64) -> Vec<Vec<f64>> {
+        let bases = &self.fitter.problem.bases;
         let (places, making) = match self.search(cause) {
             Search::From(_) if best.values.len() >= MANY => (self.along_the_first(cause, best), 0..1),
-            Search::Swing if best.values.len() == sought::OF_FILTER => (
-                sought::filters_at_any(resistance, RATIO, &self.fitter.problem.bases),
-                1..3,
-            ),
+            // what swings slowly and leaves nothing has no other valley
+            Search::Swing if sought::is_fast(&best.values, bases) || self.structure(best) > 0.0 => {
+                (sought::filters_at_any(resistance, RATIO, bases), 1..3)
+            }
             _ => return Vec::new(),
         };
         // the others follow, in the directions that they have where the fit ended: of a capacitor these are the same beside any inductance
-        let mut others = self.fitter.sensitivity(cause, &best.state);
-        others.drain(making);
+        let all = self.fitter.sensitivity(cause, &best.state).into_iter().enumerate();
+        let others: Vec<Vec<f64>> = all
+            .filter(|(number, _)| !making.contains(number))
+            .map(|(_, column)| column)
+            .collect();
         let looked = |start: &Vec<f64>| {
             let mut left = self.fitter.state_at(&[cause], start, self.fitter.null, 0).0.residual;
             self.fitter.basis.project(&mut left);

@@ -172,6 +172,9 @@ pub(crate) struct Waves {
     pub power: f64,
 }
 
+/// Turns that each record has to hold: of half of one a slope and a mean take most.
+const TURNS: f64 = 0.6;
+
 /// The frequency at which lines of any phase hold most of the samples (time, value) of several records.
 pub(crate) fn waves(records: &[Vec<(f64, f64)>], t_sw: f64) -> Option<Waves> {
     let centred = records.iter().map(|samples| {
@@ -194,8 +197,8 @@ pub(crate) fn waves(records: &[Vec<(f64, f64)>], t_sw: f64) -> Option<Waves> {
     };
     let alone = |each: &[Wave]| each.iter().map(Wave::power).sum::<f64>();
     let together = |each: &[Wave]| each.iter().fold(Wave::default(), Wave::and).power();
-    // a record has to hold a turn; a quarter of one between two frequencies
-    let (lowest, step) = ((LOWEST / t_sw).max(1.0 / shortest), 0.25 / longest);
+    // a quarter of a turn between two frequencies
+    let (lowest, step) = ((LOWEST / t_sw).max(TURNS / shortest), 0.25 / longest);
     let count = ((HIGHEST / t_sw - lowest) / step).max(0.0) as usize;
     let grid = parallel::map(&(0..=count).collect::<Vec<_>>(), |k| {
         let frequency = lowest + *k as f64 * step;

@@ -153,6 +153,17 @@ fn each_record_begins_somewhere_in_a_line_of_the_source() {
     assert!(held.rmse_after < 1.1 * held.floor, "{held:?}");
 }
 
+/// A line of 329 Hz of which two records hold four fifths of a turn, each in a phase of its own: lines were sought from a whole turn on.
+#[test]
+fn a_line_is_found_in_records_of_less_than_a_turn() {
+    let findings = findings("line_of_less_than_a_turn", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::Explained, "{}", findings.sentence);
+    assert_eq!(ids(&findings), ["input_ripple"], "{}", findings.sentence);
+    let of = |name: &str| &findings.causes[0].parameters[name];
+    assert!((of("frequency").value - 328.98).abs() < 2.0, "{}", findings.sentence);
+    assert!((of("ripple").value - 0.065194).abs() < 0.001, "{}", findings.sentence);
+}
+
 /// A line of 778 Hz in records of one to two turns. The clock of the held-out record was .009 turns off, and the cause was refuted by that.
 #[test]
 fn the_clock_of_a_record_of_few_turns_is_where_its_line_fits() {
@@ -162,4 +173,13 @@ fn the_clock_of_a_record_of_few_turns_is_where_its_line_fits() {
     let of = |name: &str| &findings.causes[0].parameters[name];
     assert!((of("frequency").value - 777.99).abs() < 3.0, "{}", findings.sentence);
     assert!((of("ripple").value - 0.14457).abs() < 0.002, "{}", findings.sentence);
+}
+
+/// The duty of the other switch, in a buck whose current rests where it is sampled: 3 mA of noise were a thousandth of what the load draws, and the record was
+/// refused since its load were not in ohm.
+#[test]
+fn a_current_that_rests_where_it_is_sampled_says_nothing_of_the_load_s_unit() {
+    let findings = findings("lower_switch_at_rest", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::Unexplained, "{}", findings.sentence);
+    assert!(findings.sentence.contains("1 - d"), "{}", findings.sentence);
 }

@@ -100,6 +100,11 @@ pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], st
     };
     list.extend(loose(problem, attribution));
     list.extend(noisy(problem));
+    let untried = problem.work.lacks_rivals().then(|| {
+        "not all that may stand in the place of these causes was tried within the budget: another may do as well"
+            .to_owned()
+    });
+    list.extend(untried.map(Doubt::Open));
     let mut place = 0;
     let mut member = usize::MAX;
     for profile in profiles {

@@ -30,6 +30,10 @@ const ROWS_OF_ALL: u64 = 55_000_000;
 const ROWS_OF_LOOK: u64 = 10_000_000;
 /// Share of them from which on the rest is reckoned: some causes are dearer than others.
 const OF_LOOK: f64 = 0.25;
+/// Rows in which it is sought what may stand in the place of the causes; where they do not suffice a tie may be left.
+// twelve rivals of a node's capacitance beside a cable and a counter took 173 s of a core (boost, 464 rows in another order), and came near nothing. A
+// convention: half of what a search may take whose causes come near
+const ROWS_OF_RIVALS: u64 = 15_000_000;
 /// Rows in which terms of an empirical correction are sought; the one that is begun is brought to its end.
 // a term takes 2 million in records of a thousand rows, and there are at most seven
 const ROWS_OF_TERMS: u64 = 20_000_000;
@@ -67,6 +71,8 @@ pub struct Work {
     all: Arc<Counts>,
     /// Whether the causes that this search has found come near.
     is_near: Arc<AtomicBool>,
+    /// Whether something that may stand in the place of its causes was not tried.
+    lacks_rivals: Arc<AtomicBool>,
     /// Rows while they do not, and where they do.
     far_off: u64,
     near: u64,
@@ -78,6 +84,7 @@ impl Default for Work {
         Work {
             all: Arc::default(),
             is_near: Arc::default(),
+            lacks_rivals: Arc::default(),
             far_off: ROWS_FAR_OFF,
             near: ROWS,
             most_causes: MOST,
@@ -110,6 +117,7 @@ impl Work {
         Work {
             all: Arc::clone(&self.all),
             is_near: Arc::default(),
+            lacks_rivals: Arc::default(),
             far_off: ROWS_OF_PART.max(least),
             near: ROWS.max(least),
             most_causes: MOST_BESIDE,
@@ -143,6 +151,20 @@ impl Work {
     /// Whether a fit has taken all that it may, of records that take `given` rows as the model was given.
     pub(crate) fn is_fit_over(rows: u64, given: u64) -> bool {
         rows > ROWS_OF_FIT.max(given.saturating_mul(SIMULATIONS_OF_FIT))
+    }
+
+    /// Whether another rival may be tried, where the first was begun at so many rows; one that may not is remembered.
+    pub(crate) fn may_seek_rivals(&self, begun_at: u64) -> bool {
+        let may = self.rows() < begun_at.saturating_add(ROWS_OF_RIVALS);
+        if !may {
+            self.lacks_rivals.store(true, Ordering::Relaxed);
+        }
+        may
+    }
+
+    /// Whether some rival was not tried.
+    pub(crate) fn lacks_rivals(&self) -> bool {
+        self.lacks_rivals.load(Ordering::Relaxed)
     }
 
     /// Whether a look at all causes goes on that has taken so many rows for this share of them.
@@ -219,7 +241,7 @@ impl Work {
 
 #[cfg(test)]
 mod tests {
-    use super::{ROWS, ROWS_FAR_OFF, Work};
+    use super::{ROWS, ROWS_FAR_OFF, ROWS_OF_RIVALS, Work};
 
     #[test]
     fn work_ends_at_its_budget_for_all_who_share_it_and_only_what_was_not_begun_is_said() {
@@ -250,5 +272,18 @@ mod tests {
         let another = work.of_part();
         another.leaves(0.0);
         assert!(another.goes_on() && !another.half_is_left());
+    }
+
+    #[test]
+    fn rivals_that_were_not_tried_are_remembered_by_the_search_that_wanted_them() {
+        let work = Work::default();
+        work.count(ROWS);
+        let begun_at = work.rows();
+        assert!(work.may_seek_rivals(begun_at) && !work.lacks_rivals());
+        work.count(ROWS_OF_RIVALS);
+        let part = work.of_part();
+        assert!(!work.may_seek_rivals(begun_at) && work.lacks_rivals());
+        // another search has rivals of its own
+        assert!(part.may_seek_rivals(part.rows()) && !part.lacks_rivals());
     }
 }

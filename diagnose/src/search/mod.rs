@@ -372,7 +372,7 @@ impl Searcher<'_> {
                 break;
             }
             let stage = format!("another cause for {}", self.id(best.causes[member]));
-            for other in self.replacements(&best, member, |looks| top(looks, MOST_EXCHANGED), &stage) {
+            for other in self.replacements(&best, member, |looks| top(looks, MOST_EXCHANGED), (&stage, None)) {
                 if self.score(&other) < self.score(&best) - SWAP {
                     best = self.polished(&other);
                     break;

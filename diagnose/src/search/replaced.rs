@@ -1,6 +1,6 @@
 //! Sets with another cause in the place of one: what is better, and what does as well.
 
-use super::{FOLLOWED, NEAR, Searcher, Set, TIE, TIE_SHARE, top, without};
+use super::{AT_ONCE, FOLLOWED, NEAR, Searcher, Set, TIE, TIE_SHARE, top, without};
 use crate::fit::Fit;
 use crate::progress;
 
@@ -11,13 +11,13 @@ const WINDING: &str = "dcr";
 
 impl Searcher<'_> {
     /// Fits of the set with other causes in the place of one: those that are `chosen` of what gains a share of the most at first order, where
-    /// the kept ones alone end.
+    /// the kept ones alone end. As rivals, the first of which was begun at so many rows, they are bounded.
     pub(super) fn replacements(
         &self,
         fit: &Fit,
         member: usize,
         chosen: impl Fn(Vec<(f64, usize)>) -> Vec<usize>,
-        stage: &str,
+        (stage, begun_at): (&str, Option<u64>),
     ) -> Vec<Fit> {
         let kept = without(&fit.causes, member);
         let kept = self.with_fewer(&kept, &self.values_of(fit, &kept), &fit.state);
@@ -26,9 +26,27 @@ impl Searcher<'_> {
         let looks = self.looks(&set, &self.others(&fit.causes), &kept.state);
         let most = looks.iter().map(|look| look.0).fold(0.0, f64::max);
         let looks = looks.into_iter().filter(|look| look.0 > FOLLOWED * most).collect();
-        progress::map(self.say, stage, &chosen(looks), |cause| {
+        self.within(begun_at, &chosen(looks), stage, |cause| {
             self.added(&set, *cause, &kept.state)
         })
+    }
+
+    /// Those of `all` that may still be tried, where the first rival was begun at so many rows; all where none was.
+    fn within<T: Sync, R: Send>(
+        &self,
+        begun_at: Option<u64>,
+        all: &[T],
+        stage: &str,
+        tried: impl Fn(&T) -> R + Sync,
+    ) -> Vec<R> {
+        let mut list = Vec::new();
+        for some in all.chunks(AT_ONCE) {
+            if begun_at.is_some_and(|begun_at| !self.fitter.problem.work.may_seek_rivals(begun_at)) {
+                break;
+            }
+            list.extend(progress::map(self.say, stage, some, &tried));
+        }
+        list
     }
 
     /// Of each cause the form that gains most and the one of fewest parameters: a cause with many forms would take the places of the others, and its
@@ -76,6 +94,7 @@ impl Searcher<'_> {
 
     /// For each cause of a set, what explains the data as well in its place.
     pub fn rivals(&self, best: &Fit, evidence: &[f64], singles: &[Fit]) -> Vec<Vec<Fit>> {
+        let begun_at = Some(self.fitter.problem.work.rows());
         let members = best.causes.iter().enumerate();
         members
             .map(|(member, own)| {
@@ -92,7 +111,7 @@ impl Searcher<'_> {
                         self.with_both_switches(*own, self.with_others_of_edges(*own, usual))
                     };
                     let stage = format!("rivals of {}", self.id(*own));
-                    all.extend(self.replacements(best, member, chosen, &stage));
+                    all.extend(self.replacements(best, member, chosen, (&stage, begun_at)));
                 }
                 let is_rival = |fit: &Fit| {
                     let other = fit.causes.last().is_some_and(|cause| !self.same(*cause, *own));
@@ -106,7 +125,7 @@ impl Searcher<'_> {
                 let near = |fit: &Fit| fit.state.chi2 <= best.state.chi2 + NEAR * tolerance;
                 let all: Vec<Fit> = all.into_iter().filter(near).collect();
                 let stage = format!("rivals of {}, those that come near", self.id(*own));
-                let all = progress::map(self.say, &stage, &all, |fit| self.polished(fit));
+                let all = self.within(begun_at, &all, &stage, |fit| self.polished(fit));
                 let mut list: Vec<Fit> = all.into_iter().filter(is_rival).collect();
                 list.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
                 let mut seen = Vec::new();

@@ -10,6 +10,17 @@ pub struct Edges {
     pub second: Vec<(f64, f64)>,
 }
 
+impl Edges {
+    /// The same edges on a clock that starts `by` later.
+    pub fn earlier(mut self, by: f64) -> Edges {
+        for (on, off) in self.main.iter_mut().chain(&mut self.second) {
+            *on -= by;
+            *off -= by;
+        }
+        self
+    }
+}
+
 /// The duties that reach the comparator: late, moved, rounded, trembling.
 fn compared(board: &Board, duties: &[f64]) -> Vec<f64> {
     let g = &board.gates;

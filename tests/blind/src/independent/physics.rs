@@ -257,6 +257,51 @@ fn a_diode_lets_no_current_back_beside_a_lossy_core() {
     assert!(resting > trace.nodes.len() / 10, "{resting} of {}", trace.nodes.len());
 }
 
+/// Pulses that reach over the end of their period, a diode that recovers at its start, a node that falls there: the first period has what was before it.
+#[test]
+fn a_run_of_equal_periods_stays_where_it_begins() {
+    let load = Load {
+        i: 2.0,
+        ..Load::default()
+    };
+    for topology in [Topology::Buck, Topology::Boost, Topology::BuckBoost] {
+        for carrier in [Carrier::Trailing, Carrier::Leading, Carrier::Centre] {
+            for (synchronous, fall, recovery, node) in [
+                (true, 3e-7, 0.0, 0.0),
+                (false, 3e-7, 0.0, 0.0),
+                (false, 0.0, 2e-7, 0.0),
+                (false, 0.0, 0.0, 5e-9),
+            ] {
+                if node > 0.0 && topology != Topology::Buck {
+                    continue;
+                }
+                let mut board = ideal(topology);
+                (board.stage.synchronous, board.stage.r_winding) = (synchronous, 0.1);
+                (board.gates.carrier, board.gates.fall) = (carrier, fall);
+                (board.gates.recovery, board.gates.node) = (recovery, node);
+                let period = Period {
+                    duty: 0.4,
+                    load,
+                    after: 0.0,
+                };
+                let trace = run(&board, &[period; 8], STEPS, &mut Rng::new(0, &[]));
+                let of = |from: f64, what: fn(&Nodes) -> f64| {
+                    let part = |t: &f64| *t >= (from - 1e-6) / 1e5 && *t <= (from + 1.0 + 1e-6) / 1e5;
+                    let inside: Vec<usize> = (0..trace.t.len()).filter(|n| part(&trace.t[*n])).collect();
+                    let t = inside.iter().map(|n| trace.t[*n]).collect();
+                    let nodes = inside.iter().map(|n| trace.nodes[*n]).collect();
+                    mean(&Trace { t, nodes }, what)
+                };
+                let name = format!("{topology:?} {carrier:?} {synchronous} {fall:e} {recovery:e} {node:e}");
+                for what in [(|n| n.v_out) as fn(&Nodes) -> f64, |n| n.i_l] {
+                    let (first, last) = (of(0.0, what), of(7.0, what));
+                    assert!((first / last - 1.0).abs() < 1e-4, "{name}: {first} {last}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn twice_the_steps_change_next_to_nothing() {
     let mut board = ideal(Topology::Buck);

@@ -6,6 +6,7 @@ use crate::independent::circuit::{
 };
 use crate::independent::gates::{Cursor, Edges, edges};
 use crate::rng::Rng;
+use std::iter::once;
 
 /// A period of the PWM: what is commanded and set in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -215,7 +216,7 @@ pub fn settle(board: &Board, duty: f64, load: &Load) -> State {
     let t_sw = calm.t_sw();
     // the third of equal periods has its neighbours' edges as in a long run
     let map = |x: &State| {
-        let mut walk = start(&calm, &edges, *x, STEPS);
+        let mut walk = start(&calm, &edges, t_sw, *x, STEPS);
         walk.to(t_sw, 2.0 * t_sw, load, None);
         walk.x
     };
@@ -285,7 +286,17 @@ fn newton(map: &impl Fn(&State) -> State, x: &State, fx: &State, scale: &State) 
     Some(step)
 }
 
-fn start<'a>(board: &'a Board, edges: &'a Edges, x: State, steps: usize) -> Walk<'a> {
+/// A walk from `t` on, with what conducted right before.
+fn start<'a>(board: &'a Board, edges: &'a Edges, t: f64, x: State, steps: usize) -> Walk<'a> {
+    let h = board.t_sw() / steps as f64;
+    let held = |list: &[(f64, f64)]| list.iter().any(|(on, off)| *on < t - 1e-9 * h && t <= *off + 1e-9 * h);
+    let was = match x[I_L] {
+        _ if held(&edges.main) => Path::Main,
+        // a switch in a diode's place conducts what that would
+        i if held(&edges.second) || i > 0.0 => Path::Diode,
+        i if i < 0.0 => Path::Body,
+        _ => Path::Rest,
+    };
     Walk {
         board,
         edges,
@@ -294,9 +305,9 @@ fn start<'a>(board: &'a Board, edges: &'a Edges, x: State, steps: usize) -> Walk
         x,
         node: 0.0,
         recovering: f64::NEG_INFINITY,
-        was: Path::Rest,
+        was,
         warmth: 0.0,
-        h: board.t_sw() / steps as f64,
+        h,
     }
 }
 
@@ -305,11 +316,12 @@ pub fn run(board: &Board, periods: &[Period], steps: usize, random: &mut Rng) ->
     let Some(first) = periods.first() else {
         return Trace::default();
     };
-    let duties: Vec<f64> = periods.iter().map(|period| period.duty).collect();
-    let edges = edges(board, &duties, random);
-    let x = settle(board, first.duty, &first.load);
-    let mut walk = start(board, &edges, x, steps);
     let t_sw = board.t_sw();
+    // a pulse of the period before may reach into the first one
+    let duties: Vec<f64> = once(first).chain(periods).map(|period| period.duty).collect();
+    let edges = edges(board, &duties, random).earlier(t_sw);
+    let x = settle(board, first.duty, &first.load);
+    let mut walk = start(board, &edges, 0.0, x, steps);
     let mut trace = Trace::default();
     let mut before = first.load;
     for (k, period) in periods.iter().enumerate() {
@@ -339,12 +351,10 @@ pub fn closed(
     let mut x = settle(board, first, &loads[0]);
     for k in 0..loads.len().saturating_sub(1) {
         // the edges of three periods: what was before reaches into this one
-        let from = k.saturating_sub(1);
-        let mut near: Vec<f64> = duties[from..].to_vec();
-        near.push(duties[k]);
+        let near = [duties[k.saturating_sub(1)], duties[k], duties[k]];
         let edges = edges(board, &near, &mut Rng::new(0, &[]));
-        let mut walk = start(board, &edges, x, STEPS);
-        let begin = (k - from) as f64 * t_sw;
+        let begin = t_sw;
+        let mut walk = start(board, &edges, begin, x, STEPS);
         let mut trace = Trace::default();
         walk.to(begin, begin + t_sw, &loads[k], Some(&mut trace));
         x = walk.x;

@@ -46,10 +46,13 @@ fn wild_rows(left: &[f64], raw: &[f64]) -> Vec<usize> {
     let is_wild = |row: &usize| {
         let row = *row;
         let is_brought = || brings(&shown, left, &wild_left, row);
+        // spikes among the first rows bend the initial state to them, and the model rings where the signal rests
+        let leaps_at_rest = || leaps_over(raw, &wild_raw, row) && !brings(&shown, raw, &wild_raw, row);
         leaps(left, row) && (leaps(raw, row) || leaps_off_curve(raw, row))
             || leaps_over(left, &wild_left, row) && (leaps_over(raw, &wild_raw, row) || !is_brought())
             || leaps_beside_bend(left, &shown, row)
             || leaps_in_a_pair(left, row) && (leaps_in_a_pair(raw, row) || !is_brought())
+            || leaps_at_rest()
     };
     (2..left.len().saturating_sub(2)).filter(is_wild).collect()
 }
@@ -173,11 +176,11 @@ fn leaps_beside_bend(left: &[f64], shown: &[f64], row: usize) -> bool {
     leaps(left, row) && off_curve(left, row).is_some_and(|off| off > 2.0 * FAR && is_single(off))
 }
 
-/// Whether the model may bring what leaps in the residual: it bends there, or near it, by more than a share of the leap.
-fn brings(shown: &[f64], left: &[f64], wild: &[bool], row: usize) -> bool {
-    let near = row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(left.len());
-    let calm = near.clone().filter(|other| !wild[*other]).map(|other| left[other]);
-    let leap = (left[row] - median(calm.filter(|v| v.is_finite()))).abs();
+/// Whether the model may bring what leaps in the residual, or in the signal: it bends there, or near it, by more than a share of the leap.
+fn brings(shown: &[f64], values: &[f64], wild: &[bool], row: usize) -> bool {
+    let near = row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(values.len());
+    let calm = near.clone().filter(|other| !wild[*other]).map(|other| values[other]);
+    let leap = (values[row] - median(calm.filter(|v| v.is_finite()))).abs();
     let bends = |other: usize| off_curve(shown, other).is_some_and(|bend| bend > BENDS * leap);
     !leap.is_finite() || near.into_iter().any(bends)
 }
@@ -309,6 +312,24 @@ mod tests {
             .map(|(a, b)| a - b + normal(&mut state))
             .collect();
         assert_eq!(wild_rows(&own, &raw(&own, &kicked)), [] as [usize; 0]);
+    }
+
+    #[test]
+    fn spikes_of_a_signal_at_rest_are_seen_though_the_model_rings_for_them() {
+        let mut state = 17;
+        // what a fit makes of two spikes among the first rows
+        let shown: Vec<f64> = (0..100)
+            .map(|n| 240.0 * (f64::from(n) * 0.35).sin() * (f64::from(n) * -0.08).exp())
+            .collect();
+        let mut raw: Vec<f64> = (0..100).map(|_| normal(&mut state)).collect();
+        (raw[5], raw[7]) = (raw[5] - 700.0, raw[7] - 700.0);
+        let left: Vec<f64> = raw.iter().zip(&shown).map(|(a, b)| a - b).collect();
+        assert_eq!(wild_rows(&left, &raw), [5, 7]);
+        // a kick that the model has as well, a row late
+        let mut kicked = shown.clone();
+        (kicked[6], kicked[8]) = (kicked[6] - 700.0, kicked[8] - 700.0);
+        let left: Vec<f64> = raw.iter().zip(&kicked).map(|(a, b)| a - b).collect();
+        assert_eq!(wild_rows(&left, &raw), [] as [usize; 0]);
     }
 
     #[test]

@@ -9,23 +9,30 @@
 //!
 //! Invariant: values stay within their ranges, and chi-square only falls.
 
-use crate::basis::{Basis, Moving};
+use crate::basis::Basis;
 use crate::causes::{Candidate, Search};
 use crate::drive::Model;
 use crate::normal::Normal;
-use crate::problem::{Problem, Starts, axpy, dot, nudged};
+use crate::problem::{Problem, Starts, axpy, nudged};
 use crate::search::sought;
 use crate::work::Work;
 
-/// A step that gains less than this ends the settling of initial states: a five-hundredth of what
-/// decides a tie (9).
-const SMALL_GAIN: f64 = 0.02;
+mod state;
+
+pub use state::State;
 
 /// A fit that leaves more than this mean square in a record is looked at again with the initial states that it has by now, ...
 // what leaves less has no structure left (`shape`), and most fits need no second look
 const STILL_OFF: f64 = 1.5;
 /// ... if these gain a twentieth: less is no frequency that has run away.
 const RUN_AWAY: f64 = 0.95;
+/// So is one whose last step of those that it may take still gains so much, what decides a tie, ...
+const UNFINISHED: f64 = 9.0;
+/// ... and this share of what it leaves: with what initial states explain at the model as given, steps of a supply 4 % higher left five sixths of the
+/// way each time, 5 % of what was left at the end, ...
+const UNFINISHED_SHARE: f64 = 0.01;
+/// ... where it comes within twice the noise: of what ends farther off most lead nowhere, and another look at each was a fourth of a search.
+const WITHIN: f64 = 4.0;
 
 /// When a fit ends.
 #[derive(Debug, Clone, Copy)]
@@ -57,21 +64,6 @@ pub const FINE: Effort = Effort {
     small_gain: 0.02,
 };
 
-/// A place in the space of models with the initial states that fit best.
-#[derive(Debug, Clone)]
-pub struct State {
-    /// The model.
-    pub model: Model,
-    /// Initial states.
-    pub starts: Starts,
-    /// Measured minus simulated over noise.
-    pub residual: Vec<f64>,
-    /// Sum of its squares.
-    pub chi2: f64,
-    /// What simulating it took, in rows.
-    pub(crate) rows: u64,
-}
-
 /// A fitted set of causes.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -83,54 +75,6 @@ pub struct Fit {
     pub state: State,
     /// Covariance of the parameters for the noise assumed.
     pub covariance: Vec<Vec<f64>>,
-}
-
-impl State {
-    /// The model with the initial states fitted.
-    #[must_use]
-    pub fn settle(problem: &Problem, model: &Model, starts: &Starts, basis: Option<&Basis>) -> Self {
-        Self::settle_in(problem, model, starts, basis, 4)
-    }
-
-    /// The same in at most `rounds` steps.
-    fn settle_in(problem: &Problem, model: &Model, starts: &Starts, basis: Option<&Basis>, rounds: usize) -> Self {
-        let mut state = Self::at(problem, model, starts.clone());
-        for _ in 0..rounds {
-            let own;
-            let basis = match basis {
-                Some(basis) => basis,
-                None => {
-                    own = problem.basis(model, &state.starts, &state.residual);
-                    &own
-                }
-            };
-            // linear in the initial states only near them: a step that costs is not taken
-            let next = Moving::EACH.into_iter().find_map(|moving| {
-                let mut starts = state.starts.clone();
-                basis.absorb(&state.residual, &mut starts, moving);
-                let next = Self::at(problem, model, starts);
-                (next.chi2 < state.chi2).then_some(next)
-            });
-            let Some(next) = next else { break };
-            let gain = state.chi2 - next.chi2;
-            state = next;
-            if gain < SMALL_GAIN {
-                break;
-            }
-        }
-        state
-    }
-
-    pub(crate) fn at(problem: &Problem, model: &Model, starts: Starts) -> Self {
-        let (residual, rows) = problem.residual_counted(model, &starts);
-        State {
-            model: model.clone(),
-            rows,
-            chi2: dot(&residual, &residual),
-            starts,
-            residual,
-        }
-    }
 }
 
 /// All that a fit needs.
@@ -228,8 +172,8 @@ impl Fitter<'_> {
     #[must_use]
     pub fn holding(&self, causes: &[usize], values: &[f64], from: &State, held: Option<usize>) -> Fit {
         let mut rows = 0;
-        let fit = self.in_basis(causes, values, from, held, &mut rows);
-        if !self.problem.leaves_more(&fit.state.residual, STILL_OFF) {
+        let (fit, is_over) = self.in_basis(causes, values, from, held, &mut rows);
+        if is_over && !self.problem.leaves_more(&fit.state.residual, STILL_OFF) {
             return fit;
         }
         // initial states ring as the filter does: where the fit has moved its frequency, what they explain is something else by now
@@ -248,23 +192,30 @@ impl Fitter<'_> {
             states: self.problem.first_starts(model).states,
             ..starts.clone()
         };
-        let settled = self.problem.nearer_of_each(settle(starts), &settle(&begun));
-        if settled.chi2 > RUN_AWAY * chi2 {
+        let (settled, _) = self.problem.nearer_of_each(settle(starts), &settle(&begun));
+        if is_over && settled.chi2 > RUN_AWAY * chi2 {
             return fit;
         }
         let there = Fitter { basis: &own, ..*self };
-        let again = there.in_basis(causes, &fit.values, &settled, held, &mut rows);
+        let (again, _) = there.in_basis(causes, &fit.values, &settled, held, &mut rows);
         if again.state.chi2 < fit.state.chi2 { again } else { fit }
     }
 
     /// The first steps of a fit, without the second look of [`Fitter::holding`].
     pub(crate) fn first_steps(&self, causes: &[usize], values: &[f64], from: &State) -> Fit {
         let fitter = Fitter { effort: FIRST, ..*self };
-        fitter.in_basis(causes, values, from, None, &mut 0)
+        fitter.in_basis(causes, values, from, None, &mut 0).0
     }
 
-    /// A fit with what initial states explain at the model as given; `rows` grows by what it takes.
-    fn in_basis(&self, causes: &[usize], values: &[f64], from: &State, held: Option<usize>, rows: &mut u64) -> Fit {
+    /// A fit with what initial states explain at the model as given, and whether it has come to its end; `rows` grows by what it takes.
+    fn in_basis(
+        &self,
+        causes: &[usize],
+        values: &[f64],
+        from: &State,
+        held: Option<usize>,
+        rows: &mut u64,
+    ) -> (Fit, bool) {
         let places = self.places(causes);
         let (mut state, mut values) = self.state_at(causes, values, from, 2);
         let smooth: Vec<usize> = (0..places.len())
@@ -272,7 +223,7 @@ impl Fitter<'_> {
             .collect();
         let mut covariance = vec![vec![0.0; places.len()]; places.len()];
         // a convention, as Marquardt's factor of ten in `improve`
-        let mut damping = 1e-3;
+        let (mut damping, mut last_gain) = (1e-3, 0.0);
         for _ in 0..self.effort.steps {
             if smooth.is_empty() || Work::is_fit_over(*rows, self.null.rows) {
                 break;
@@ -281,22 +232,27 @@ impl Fitter<'_> {
             *rows += round.jacobian.rows;
             // before the step: a fit that cannot improve has a covariance all the same
             round.normal.covariance(&smooth, &round.jacobian.scale, &mut covariance);
+            last_gain = 0.0;
             let Some((next, moved)) = self.improve(&round, &values, &state, &mut damping, rows) else {
                 break;
             };
             let gain = state.chi2 - next.chi2;
             (state, values) = (next, moved);
+            last_gain = gain;
             // relative as well: of a chi-square in the millions a gain of 1 decides nothing
             if gain < self.effort.small_gain.max(1e-6 * state.chi2) {
                 break;
             }
         }
-        Fit {
+        let is_far = state.chi2 > WITHIN * self.problem.count() as f64;
+        let is_over = is_far || last_gain < UNFINISHED.max(UNFINISHED_SHARE * state.chi2);
+        let fit = Fit {
             causes: causes.to_vec(),
             values,
             state,
             covariance,
-        }
+        };
+        (fit, is_over)
     }
 
     /// Sensitivities and normal equations at a state.
@@ -368,13 +324,8 @@ impl Fitter<'_> {
                 *damping *= 10.0;
                 continue;
             }
-            let next = Moving::EACH.into_iter().find_map(|moving| {
-                let mut starts = state.starts.clone();
-                self.basis.absorb(&left, &mut starts, moving);
-                let next = State::at(self.problem, &model, starts);
-                *rows += next.rows;
-                (next.chi2 < state.chi2).then_some(next)
-            });
+            let (next, taken) = state.absorbing(self.problem, &model, self.basis, &left, false);
+            *rows += taken;
             if let Some(next) = next {
                 // below that a step is Gauss and Newton's anyway, and damping would only take longer to come back
                 *damping = (*damping * 0.1).max(1e-9);

@@ -2,7 +2,7 @@
 
 use super::{Searcher, gained, sought};
 use crate::causes::Search;
-use crate::fit::Fit;
+use crate::fit::{Fit, State};
 use crate::parallel;
 use crate::problem::dot;
 
@@ -32,7 +32,8 @@ impl Searcher<'_> {
         let filter = (0..fits.len()).find(|other| is_filter(other) && *other != cause && self.structure(best) > 0.0);
         let cause = filter.unwrap_or(cause);
         let starts = self.valleys(cause, &fits[cause], best.values[0]);
-        let begun = parallel::map(&starts, |values| self.fitter.from(&[cause], values, self.fitter.null));
+        let from = self.beginning_as(cause, &fits[cause]);
+        let begun = parallel::map(&starts, |values| self.fitter.from(&[cause], values, &from));
         let found = begun.into_iter().min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2))?;
         (found.state.chi2 < fits[cause].state.chi2).then_some((cause, found))
     }
@@ -54,8 +55,9 @@ impl Searcher<'_> {
             .filter(|(number, _)| !making.contains(number))
             .map(|(_, column)| column)
             .collect();
+        let from = self.beginning_as(cause, best);
         let looked = |start: &Vec<f64>| {
-            let mut left = self.fitter.state_at(&[cause], start, self.fitter.null, 0).0.residual;
+            let mut left = self.fitter.state_at(&[cause], start, &from, 0).0.residual;
             self.fitter.basis.project(&mut left);
             dot(&left, &left) - gained(&others, &left)
         };
@@ -74,6 +76,19 @@ impl Searcher<'_> {
         lowest.sort_by(|a, b| looks[*a].0.total_cmp(&looks[*b].0));
         lowest.truncate(VALLEYS);
         lowest.into_iter().map(|at| looks[at].1.clone()).collect()
+    }
+
+    /// The model as given with the initial states of a fit of a cable: where it takes nearly all they are nearer to those of its other valleys. An input
+    /// filter is begun anew from a resistance.
+    fn beginning_as(&self, cause: usize, fit: &Fit) -> State {
+        let starts = match self.search(cause) {
+            Search::Swing => self.fitter.null.starts.clone(),
+            _ => fit.state.starts.clone(),
+        };
+        State {
+            starts,
+            ..self.fitter.null.clone()
+        }
     }
 
     /// Values of a set with its first number anywhere in its decades; none if that may be 0.

@@ -3,6 +3,7 @@
 
 use crate::basis::Basis;
 use crate::causes::{Candidate, candidates};
+use crate::clocks;
 use crate::fit::{FINE, Fit, Fitter, ROUGH, State};
 use crate::in_front;
 use crate::inside::Inside;
@@ -63,6 +64,13 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
             read
         }
         None => (problem, null, singles),
+    };
+    let (problem, singles) = match clocks::refined(&searcher(&problem, &candidates, &basis, &null, say), &singles) {
+        Some(read) => {
+            known = Known::default();
+            read
+        }
+        None => (problem, singles),
     };
     let search = Searcher {
         known,
@@ -192,6 +200,22 @@ fn sought(problem: &Problem) -> Vec<Candidate> {
             && (has_a_course || !candidate.form.is_of_a_course)
             && (has_points || !candidate.changes(&[WARMS.to_owned()]))
     });
+    let span = |record: &Record| {
+        record
+            .time
+            .last()
+            .zip(record.time.first())
+            .map_or(0.0, |(to, from)| to - from)
+    };
+    let longest = problem
+        .records
+        .iter()
+        .filter(|record| !record.settled)
+        .map(span)
+        .fold(0.0, f64::max);
+    if longest > 0.0 && problem.base.plant.source.ripple == 0.0 {
+        list.iter_mut().for_each(|candidate| candidate.turns_in(longest));
+    }
     list
 }
 

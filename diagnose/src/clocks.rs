@@ -11,10 +11,11 @@
 use std::f64::consts::TAU;
 
 use crate::drive::Model;
-use crate::fit::State;
+use crate::fit::{Fit, Fitter, State};
 use crate::noise::channel;
 use crate::problem::{Problem, Starts};
 use crate::record::Record;
+use crate::search::Searcher;
 use crate::spectrum::{Wave, waves};
 use crate::words::si;
 
@@ -51,6 +52,56 @@ pub fn align(problem: &mut Problem, state: &State) -> bool {
         problem.records[*index].clock = (turns - turns.round()) / frequency;
     }
     true
+}
+
+/// The line on the source, as a cause.
+const CAUSE: &str = "input_ripple";
+/// Rounds of clocks and line, each from the other, at most. In records of 1.3 turns each left half of what it began with.
+const ROUNDS: usize = 8;
+
+/// The problem with the clocks that fit a line on the source which explains most alone, and the single causes there, where that is a better fit. What
+/// the model as given leaves, off which they were read, tells them to some hundredths of a turn.
+pub(crate) fn refined(search: &Searcher<'_>, singles: &[Fit]) -> Option<(Problem, Vec<Fit>)> {
+    let fitter = &search.fitter;
+    let of_line = |fit: &Fit| fitter.candidates[fit.causes[0]].cause.id == CAUSE;
+    let place = (0..singles.len()).min_by(|a, b| singles[*a].state.chi2.total_cmp(&singles[*b].state.chi2))?;
+    let leads = &singles[place];
+    let gain = fitter.null.chi2 - leads.state.chi2;
+    if !of_line(leads) || gain < 0.5 * fitter.null.chi2 || fitter.null.model.plant.source.ripple > 0.0 {
+        return None;
+    }
+    let mut found: Option<(Problem, Fit)> = None;
+    for _ in 0..ROUNDS {
+        let (known, fit) = match &found {
+            Some((problem, fit)) => (problem, fit),
+            None => (fitter.problem, leads),
+        };
+        let mut problem = known.clone();
+        if !tune(&mut problem, &fit.state.model, fit.state.starts.trim, 1) {
+            break;
+        }
+        let there = Fitter {
+            problem: &problem,
+            ..*fitter
+        };
+        let next = there.from(&fit.causes, &fit.values, &fit.state);
+        if next.state.chi2 > fit.state.chi2 - WORTH {
+            break;
+        }
+        found = Some((problem, next));
+    }
+    let (problem, fit) = found?;
+    let there = Fitter {
+        problem: &problem,
+        ..*fitter
+    };
+    let mut singles = singles.to_vec();
+    for single in singles.iter_mut().filter(|single| of_line(single)) {
+        let next = there.from(&single.causes, &single.values, &single.state);
+        *single = next;
+    }
+    singles[place] = fit;
+    Some((problem, singles))
 }
 
 /// What to say of the clocks of records beside a model with a line on its source.

@@ -175,6 +175,20 @@ fn the_clock_of_a_record_of_few_turns_is_where_its_line_fits() {
     assert!((of("ripple").value - 0.14457).abs() < 0.002, "{}", findings.sentence);
 }
 
+/// A line of 1389 Hz in a buck whose current stops, and records of 1.3 turns. Off what the model as given leaves their clocks are told to .02 turns, and
+/// the cause left lines of its own.
+#[test]
+fn the_clocks_of_records_of_a_turn_follow_their_line() {
+    let findings = findings("line_of_a_turn", &["judge.csv"]);
+    assert_eq!(findings.verdict, Verdict::Explained, "{}", findings.sentence);
+    assert_eq!(ids(&findings), ["input_ripple"], "{}", findings.sentence);
+    let of = |name: &str| &findings.causes[0].parameters[name];
+    for (name, hidden) in [("frequency", 1388.76), ("ripple", 0.27334)] {
+        let value = of(name);
+        assert!(value.low < hidden && value.high > hidden, "{name} {value:?}");
+    }
+}
+
 /// The duty of the other switch, in a buck whose current rests where it is sampled: 3 mA of noise were a thousandth of what the load draws, and the record was
 /// refused since its load were not in ohm.
 #[test]

@@ -151,6 +151,11 @@ pub struct Candidate {
     pub ranges: Vec<[f64; 3]>,
 }
 
+/// The frequency of a line on the source.
+const LINE: [&str; 1] = ["source.ripple_frequency"];
+/// Turns of a line in a record, at least: of less it is another source. They are sought from .6 turns on; a convention, half of that.
+const LEAST_TURNS: f64 = 0.3;
+
 impl Candidate {
     /// The largest change of the first parameter that is tried.
     #[must_use]
@@ -169,6 +174,14 @@ impl Candidate {
         });
         let mut sizes = values.iter().zip(&self.own).zip(least).take(self.sizes());
         self.sizes() > 0 && sizes.all(|((value, own), least)| (value - own).abs() < least)
+    }
+
+    /// Bounds the frequency of a line to those that turn in a record of `longest` seconds.
+    pub(crate) fn turns_in(&mut self, longest: f64) {
+        let knobs = self.form.knobs.iter().zip(&mut self.ranges);
+        for (_, [low, high, _]) in knobs.filter(|(knob, _)| knob.keys == LINE) {
+            *low = low.max(LEAST_TURNS / longest).min(*high);
+        }
     }
 
     /// Whether it moves the edges of the gate, as the trim that stands beside every fit does.

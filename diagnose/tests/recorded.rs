@@ -117,6 +117,21 @@ fn a_cause_that_moves_the_edges_is_found_where_the_trim_has_taken_its_place() {
     );
 }
 
+/// A boost whose duty is .0062 longer, 18 ns: as much as edges do. The trim moves the other edge, and a sampling instant 17 ns later made up for that, the only
+/// cause that was named.
+#[test]
+fn a_cause_that_moves_the_edges_is_found_where_the_trim_moves_another_one() {
+    let findings = findings("edges_beside_samples", &["judge.csv"]);
+    let first = &findings.causes[0];
+    let offset = first.parameters.get("offset").or(first.parameters.get("duty_offset"));
+    assert_eq!(ids(&findings), ["duty_offset"], "{}", findings.sentence);
+    assert!(
+        offset.is_some_and(|offset| offset.low < 0.0062066 && offset.high > 0.0062066),
+        "{}",
+        findings.sentence
+    );
+}
+
 /// Both switches have twice the resistance, and loads step inside periods, which hid it from every cause alone: the tie held the winding and a
 /// diode of 1.9 ohm.
 #[test]

@@ -33,10 +33,10 @@ impl Searcher<'_> {
             _ => gained(&self.fitter.sensitivity(*cause, null), &null.residual),
         });
         let most = first_order.iter().copied().fold(0.0, f64::max);
-        let asks_for_edges = self.asks_for_edges(null);
+        let sees_edges = self.sees_edges(null);
         // a filter or a fall that is read off the records is far from its end, and promises little there
         let is_followed = |cause: usize| match self.search(cause) {
-            _ if asks_for_edges && self.fitter.candidates[cause].is_of_edges() => true,
+            _ if sees_edges && self.fitter.candidates[cause].is_of_edges() => true,
             Search::Knee | Search::Swing => first_order[cause] != 0.0,
             _ => !self.begins_at_own(cause) || first_order[cause] > (FOLLOWED * most).max(LEAST_FOLLOWED),
         };

@@ -7,7 +7,7 @@ use crate::level::threshold;
 use crate::noise;
 use crate::problem::{Problem, dot};
 use crate::profile::Profile;
-use crate::search::{TIE, TIE_SHARE};
+use crate::search::{ALIKE, TIE, TIE_SHARE};
 
 /// Share of the error above the noise that makes a counter the whole of it: what a limit cycle leaves beside a counter that imitates it is far more than
 /// a fiftieth. A convention.
@@ -136,6 +136,7 @@ impl Attribution {
         let causes: Vec<usize> = kept.iter().map(|member| best.causes[*member]).collect();
         let values: Vec<f64> = kept.iter().flat_map(|m| own(*m).map(|profile| profile.value)).collect();
         let fit = (!causes.is_empty()).then(|| self.fitter(problem).from(&causes, &values, &self.null));
+        let fit = fit.map(|fit| self.as_alone(fit));
         self.evidence = kept.iter().map(|member| self.evidence[*member]).collect();
         let gone: Vec<usize> = out.iter().map(|member| best.causes[*member]).collect();
         let rivals = |member: &usize| self.rivals_without(problem, &self.rivals[*member], fit.as_ref(), &gone);
@@ -147,6 +148,18 @@ impl Attribution {
         }
         self.best = fit;
         out.iter().map(|member| self.id(best.causes[*member])).collect()
+    }
+
+    /// A fit of one cause as that ended alone, where it ended better: beside others it may have gone to where it does not come back from. Of causes that do
+    /// the same the first in the list.
+    fn as_alone(&self, fit: Fit) -> Fit {
+        let [cause] = fit.causes[..] else { return fit };
+        let alone = |single: &&Fit| single.causes == [cause] && single.state.chi2 < fit.state.chi2;
+        let Some(single) = self.singles.iter().find(alone) else {
+            return fit;
+        };
+        let is_same = |other: &&Fit| (other.state.chi2 - single.state.chi2).abs() < ALIKE;
+        self.singles.iter().find(is_same).unwrap_or(single).clone()
     }
 
     /// What may stand in the place of a cause that is kept, without causes that are `gone`: beside them it did as well as `best` did, and does it no more
@@ -176,6 +189,27 @@ impl Attribution {
                 list.push(fit);
             }
         }
+        if let [own] = best.causes[..] {
+            self.add_singles(&mut list, (own, best), tie);
+        }
         list
+    }
+
+    /// Adds to what may stand in the place of `own`, which alone is left, the other causes that do as well alone.
+    fn add_singles(&self, list: &mut Vec<Fit>, (own, best): (usize, &Fit), tie: f64) {
+        let number = |cause: usize| self.candidates[cause].number;
+        let f_sw = best.state.model.plant.converter.f_sw;
+        let asks = |fit: &Fit| fit.state.starts.trim_of_nobody(f_sw).is_some();
+        let mut singles: Vec<&Fit> = (self.singles.iter())
+            .filter(|single| single.state.chi2 <= best.state.chi2 + tie && (asks(best) || !asks(single)))
+            .collect();
+        singles.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+        for single in singles {
+            let [cause] = single.causes[..] else { continue };
+            let is_known = |known: &Fit| known.causes.len() == 1 && number(known.causes[0]) == number(cause);
+            if number(cause) != number(own) && !list.iter().any(is_known) {
+                list.push(single.clone());
+            }
+        }
     }
 }

@@ -34,6 +34,10 @@ const OF_LOOK: f64 = 0.25;
 // twelve rivals of a node's capacitance beside a cable and a counter took 173 s of a core (boost, 464 rows in another order), and came near nothing. A
 // convention: half of what a search may take whose causes come near
 const ROWS_OF_RIVALS: u64 = 15_000_000;
+/// Rows within which intervals are still sought by fits.
+// of input filters that swing above half of the rows' rate the search takes 33 and 37 million (800 rows twice), and covariances made their intervals up to
+// four times too narrow
+const ROWS_WITH_INTERVALS: u64 = 40_000_000;
 /// Rows in which terms of an empirical correction are sought; the one that is begun is brought to its end.
 // a term takes 2 million in records of a thousand rows, and there are at most seven
 const ROWS_OF_TERMS: u64 = 20_000_000;
@@ -214,7 +218,7 @@ impl Work {
 
     /// Whether intervals may be sought by fits: they are read off the covariance where not.
     pub(crate) fn may_seek_intervals(&self) -> bool {
-        self.is_below(ROWS)
+        self.is_below(ROWS_WITH_INTERVALS)
     }
 
     fn is_below(&self, limit: u64) -> bool {

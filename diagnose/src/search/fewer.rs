@@ -58,4 +58,17 @@ impl Searcher<'_> {
             }
         }
     }
+
+    /// A single cause that is left of several, where it ended better alone: beside the others its fit may have gone to where it does not come back from.
+    pub(super) fn as_alone(&self, found: (Option<Fit>, Vec<f64>), singles: &[Fit]) -> (Option<Fit>, Vec<f64>) {
+        let better = found.0.as_ref().and_then(|best| {
+            let same = singles.iter().filter(|single| single.causes == best.causes);
+            same.filter(|single| single.state.chi2 < best.state.chi2)
+                .min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2))
+        });
+        let Some(better) = better else { return found };
+        let best = self.polished(better);
+        let evidence = self.fitter.null.chi2 - best.state.chi2;
+        (Some(best), vec![evidence])
+    }
 }

@@ -65,6 +65,9 @@ const AT_ONCE: usize = 2;
 /// Looks between two looks at the budget. A look at a counter, of which many steps are tried, costs as much as a fit. A convention.
 const LOOKS_AT_ONCE: usize = 8;
 
+/// Chi-squares nearer than this are the same: half of what ends the settling of initial states.
+pub(crate) const ALIKE: f64 = 0.01;
+
 /// Fits sets of causes.
 pub(crate) struct Searcher<'a> {
     /// Fits one set.
@@ -126,10 +129,11 @@ impl Searcher<'_> {
         names.join(" + ")
     }
 
-    /// Chi-square with a price for each parameter.
+    /// Chi-square with a price for each parameter, to the digits that mean something: of two that do the same the one that comes first in the list leads.
     pub fn score(&self, fit: &Fit) -> f64 {
         let price = libm::log(self.fitter.problem.count() as f64);
-        fit.state.chi2 + price * fit.values.len() as f64
+        let score = fit.state.chi2 + price * fit.values.len() as f64;
+        (score / ALIKE).round() * ALIKE
     }
 
     /// Scatter over that of independent noise, where a fit ends.
@@ -234,7 +238,7 @@ impl Searcher<'_> {
         if !is_spoilt && !self.is_hopeless(&best, before) {
             best = self.reformed(best);
         }
-        self.backward(best)
+        self.as_alone(self.backward(best), singles)
     }
 
     /// Sets that have a cause more than `best`, or than the `leaders` behind it.

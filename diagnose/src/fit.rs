@@ -31,7 +31,7 @@ const UNFINISHED: f64 = 9.0;
 /// ... and this share of what it leaves: with what initial states explain at the model as given, steps of a supply 4 % higher left five sixths of the
 /// way each time, 5 % of what was left at the end, ...
 const UNFINISHED_SHARE: f64 = 0.01;
-/// ... where it comes within twice the noise: of what ends farther off most lead nowhere, and another look at each was a fourth of a search.
+/// ... where it comes within twice the noise. A convention: what ends farther off leads nowhere in most cases, and another look is a fit.
 const WITHIN: f64 = 4.0;
 
 /// When a fit ends.
